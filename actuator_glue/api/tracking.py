@@ -15,7 +15,7 @@ from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.hygiene.clean import clean, common_initial, initial_state
 from actuator_glue.hygiene.despike import despiked
-from actuator_glue.inference.least_squares.data import SETTLE
+from actuator_glue.inference.least_squares.data import SETTLE, chunks
 from actuator_glue.model.effects import Scale, scale
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -164,11 +164,10 @@ def record_tracking(
     if np.ptp(counted.command) > 0.0:
         target = TargetMotion(counted.command, record.period)
         # Even as many as a kernel takes at a time are gigabytes of ten minutes at 10 kHz.
-        size = max(1, _AT_ONCE // len(record))
-        for begin in range(0, len(some), size):
-            rows = some[begin : begin + size]
-            moved = structure.simulate(rows, record, initial=initial, origin=origin)[:, settle:]
-            drawn += [_numbers(counted, target, x) for x in moved if np.isfinite(x).all()]
+        for part in chunks(len(some), len(record), _AT_ONCE, least=1):
+            moved = structure.simulate(some[part], record, initial=initial, origin=origin)
+            kept = (x[settle:] for x in moved)
+            drawn += [_numbers(counted, target, x) for x in kept if np.isfinite(x).all()]
     measured = _numbers(counted, target, counted.measured) if drawn else {}
     if drawn:
         predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}

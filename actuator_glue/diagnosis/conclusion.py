@@ -78,7 +78,7 @@ class Conclusion:
 
     @cached_property
     def told(self) -> Row:
-        """The row of the reported structure; what hum leaves is a part of its error."""
+        """The row of the reported structure; hum counts as a part of its error."""
         key = self.scope, frozenset(self.decision.final.effects)
         found = min((r for r in self.rows() if r.key == key), key=lambda r: r.left_out)
         line = self.line.rms if self.line is not None else 0.0

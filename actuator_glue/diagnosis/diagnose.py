@@ -77,7 +77,7 @@ def diagnose(
         first_look(look)
     other = wrong_setup.find(ready.fit, settings, given=given)
     if other is not None and other.runs_linearly:
-        # The hold is decided with what is missing under either; begun with the likelier one.
+        # The search starts with the likelier hold and decides between both at its end.
         ready, other = ready.with_hold('linear', replace(other, taken=True)), None
     # The error of a wrong set-up is not the actuator's: it is not searched for effects.
     search = as_given if other is not None and other.enough else conclude

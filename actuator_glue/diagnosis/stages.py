@@ -54,8 +54,8 @@ _HEALTHY, _MISSING, _FOUND = 1.25, 1.5, 3.0
 class ShareDone:
     """The share of a diagnosis that is done, which never falls; unknown labels do no harm.
 
-    While the search lasts, by its effort: where one effect is not enough it mostly takes all of
-    that, else some times what the first stage takes.
+    During the search its effort tells the share: a search for several effects mostly takes all of
+    the effort, any other a few times that of its first stage.
 
     Attributes:
         effort: of the search.

@@ -54,7 +54,7 @@ class Row(JsonObject):
 
     @property
     def key(self) -> tuple[str, frozenset[str]]:
-        """What tells it from all other rows of a table."""
+        """Scope and effects, which no other row of a table has."""
         return self.scope, frozenset(self.effects)
 
 

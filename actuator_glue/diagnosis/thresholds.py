@@ -14,8 +14,7 @@ class Thresholds:
         stroke_share: and more than this share of the command's amplitude.
         later_share: where most is explained, a further effect must remove this share of it.
         false_alarms: probability of an addition on a healthy machine (diagnosis/false_alarms.py).
-        nats: smallest out-of-sample evidence for another hold, one record's own setting, or a
-            generic surrogate.
+        nats: smallest out-of-sample evidence for another set-up or a generic surrogate.
         tie_nats: two effects cannot be told apart where their weights differ by less.
         tie_share: between equations for the same thing an error of this share of what they remove
             costs a nat.

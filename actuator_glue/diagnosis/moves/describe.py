@@ -152,7 +152,7 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     told = [n for n, row in found.rivals.items() if any(r.tied and r.name in dry for r in row)]
     if not told:
         return None
-    search.terms()
+    search.terms()  # the shapes are among them
     least = _decisive(search, selection.settings)
     selection.progress('learned term', 0.0)
     # In place of the name, or beside it, as friction may also fall with velocity.

@@ -38,7 +38,7 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
     if not other.outweighs(first):
         return follow(beside(first, other), LEARNED_TERMS, asking)
     since = since_onset(first, asking)
-    if since is not None and since.outweighs(other):  # a change may look like another hold
+    if since is not None and since.outweighs(other):  # a change can look like another hold
         return beside(since, other)
     how = 'runs linearly' if other.prepared.setup is not None else 'is held, as given,'
     other = after(first, other, f'the command {how} between its samples')
@@ -82,6 +82,7 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
     found, search = first.found, first.selection.search
     data = other.fit if first.line is None else hum.without(other.fit, first.line)
     line = 0.0 if first.line is None else first.line.rms
+    complete = first.decision.verdict != 'unexplained'
     for trial in (found.base, found.final, *found.singles[:_SINGLES]):
         if trial.own is not None:
             continue
@@ -93,7 +94,6 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
         row = replace(row, left_out=math.hypot(row.left_out, line))
         if first.prepared.setup is None:
             (row,) = table.scoped([row], table.LINEAR, table.HOLD)
-        complete = first.decision.verdict != 'unexplained'
         if table.outweighs(row, first.told, found.material, complete):
             return True
     return False

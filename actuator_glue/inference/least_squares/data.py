@@ -31,9 +31,16 @@ LANES = 32  # parameter sets of the kernels, which take as long for fewer
 _FINER, _LONGEST = 8, 600_000
 
 
-def chunks(rows: int, columns: int) -> Iterator[slice]:
-    """Yield slices of rows, of so few that their columns stay within a block, or of `LANES`."""
-    size = max(1, _BLOCK // max(columns, 1) // LANES) * LANES
+def chunks(rows: int, columns: int, block: int = _BLOCK, least: int = LANES) -> Iterator[slice]:
+    """Yield slices of rows, of so few that their columns stay within a block.
+
+    Args:
+        rows: of a table.
+        columns: of it.
+        block: numbers that are held at a time.
+        least: rows of a slice, of which all others are multiples.
+    """
+    size = max(1, block // max(columns, 1) // least) * least
     for begin in range(0, rows, size):
         yield slice(begin, begin + size)
 
