@@ -355,6 +355,8 @@ class Record:
             InputError: fewer than two samples remain.
         """
         start, stop, _ = slice(start, stop).indices(len(self))
+        if (start, stop) == (0, len(self)):
+            return self
         return replace(
             self,
             command=self.command[start:stop],

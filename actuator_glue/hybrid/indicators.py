@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import ifft, irfft, next_fast_len, prev_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, numbers
 
-_LONG = 1 << 20  # samples
+_LONG = 1 << 20  # samples, of a block and of what is compared in blocks
 
 
 class FrequencyEvaluation(NamedTuple):
@@ -50,36 +50,38 @@ class TargetMotion:
 
     def __init__(self, displacement: Array, period: float) -> None:
         self._target, _ = _checked(displacement, displacement)
+        if self._target.flags.writeable:
+            self._target = self._target.copy()
         self._period = period
 
     @cached_property
-    def _positive(self) -> tuple[NDArray[np.complex128], float]:
-        """Weights (n,) of a displacement in the index, and the equivalent frequency [Hz].
+    def _weights(self) -> tuple[Array, Array, float]:
+        """Weights of a displacement in the index, (n,) each [1/m], and its frequency [Hz].
 
         The sum of its transform times the target's conjugate over positive frequencies is a sum
-        over samples: many displacements need no transform of their own. The last samples of very
-        long ones are left out, where a transform of all would take ten times their memory.
+        over samples: many displacements need no transform of their own. The real part's weights
+        are the target itself, those of the imaginary part its Hilbert transform. The last samples
+        of very long ones are left out, where a transform of all would take ten times their memory.
         """
         n = len(self._target)
         if n > _LONG:
-            n = prev_fast_len(n)
+            n = prev_fast_len(n, real=True)
         x = rfft(self._target[:n])
         x[0] = 0.0
-        power = np.abs(x) ** 2
-        frequency = float(power @ np.fft.rfftfreq(n, self._period) / power.sum())
-        weights = ifft(x, n, overwrite_x=True)
-        np.conjugate(weights, out=weights)
-        weights *= n / power.sum()
-        return weights, frequency
+        power = x.real**2
+        power += x.imag**2
+        whole = float(power.sum())
+        frequency = float(power @ np.arange(len(power))) / (n * self._period * whole)
+        x *= 0.5 * n / whole
+        if n % 2 == 0:
+            x[-1] *= 2.0  # half the rate has no negative frequency beside it
+        real = irfft(x, n)
+        x *= -1j
+        return real, irfft(x, n, overwrite_x=True), frequency
 
     @cached_property
     def _peak(self) -> float:
         return float(np.abs(self._target).max())
-
-    @cached_property
-    def _steps(self) -> Array:
-        """Half of what the target moves in each step, (n - 1,) [m]."""
-        return 0.5 * np.diff(self._target)
 
     @cached_property
     def _reversed(self) -> tuple[NDArray[np.complex128], int]:
@@ -96,9 +98,9 @@ class TargetMotion:
             InputError: as `_checked`.
         """
         _, measured = _checked(self._target, measured)
-        weights, frequency = self._positive
-        measured = measured[: len(weights)]
-        index = weights.real @ measured + 1j * (weights.imag @ measured)
+        real, imaginary, frequency = self._weights
+        measured = measured[: len(real)]
+        index = real @ measured - 1j * (imaginary @ measured)
         return FrequencyEvaluation(
             float(abs(index)), float(-np.angle(index) / (2.0 * np.pi * frequency)), frequency
         )
@@ -139,10 +141,15 @@ class TargetMotion:
             InputError: as `_checked`.
         """
         _, measured = _checked(self._target, measured)
-        # Energies over the stiffness.
-        work = np.cumsum((measured[1:] + measured[:-1]) * self._steps)
-        lost = work[-1] - 0.5 * (measured[-1] ** 2 - measured[0] ** 2)
-        whole = max(work.max(), -work.min()) + 0.5 * max(measured.max(), -measured.min()) ** 2
+        # Energies over the stiffness, in blocks.
+        lost, most = 0.0, 0.0
+        for begin in range(0, len(measured) - 1, _LONG):
+            block = slice(begin, begin + _LONG + 1)
+            force = measured[block][1:] + measured[block][:-1]
+            work = lost + np.cumsum(0.5 * force * np.diff(self._target[block]))
+            lost, most = float(work[-1]), max(most, float(work.max()), -float(work.min()))
+        whole = most + 0.5 * max(measured.max(), -measured.min()) ** 2
+        lost -= 0.5 * (measured[-1] ** 2 - measured[0] ** 2)
         return float(lost / whole) if whole > 0.0 else 0.0
 
 
@@ -158,10 +165,11 @@ def lag_by_blocks(target: Array, measured: Array, most: int = 1 << 17) -> int:
     """
     size = next_fast_len(4 * most, real=True)
     total = np.zeros(size)
-    padded = np.concatenate([np.zeros(most), measured, np.zeros(most)])
     for begin in range(0, len(target), 2 * most):
         asked = target[begin : begin + 2 * most]
-        reached = padded[begin : begin + len(asked) + 2 * most]
+        before = max(0, most - begin)  # of the samples that would precede the record
+        reached = measured[max(0, begin - most) : begin + len(asked) + most]
+        reached = np.concatenate([np.zeros(before), reached])
         total += irfft(rfft(reached, size) * rfft(asked, size).conj(), size)
     return int(np.argmax(total[: 2 * most + 1])) - most
 
@@ -212,12 +220,12 @@ def energy_error(target: Array, measured: Array, force: Array, stiffness: float)
 
 
 def _checked(target: Array, measured: Array) -> tuple[Array, Array]:
-    """Return both as arrays.
+    """Return both as arrays, without a copy of what is one of doubles.
 
     Raises:
         InputError: not two rows of one length, values that are not finite, a target at rest.
     """
-    target, measured = numbers(target), numbers(measured)
+    target, measured = _doubles(target), _doubles(measured)
     if target.ndim != 1 or target.shape != measured.shape or len(target) < 4:
         raise InputError(
             f'target has shape {target.shape}, measured {measured.shape}; give two rows of one '
@@ -228,3 +236,8 @@ def _checked(target: Array, measured: Array) -> tuple[Array, Array]:
     if np.ptp(target) == 0.0:
         raise InputError('the target does not move: nothing to track')
     return target, measured
+
+
+def _doubles(values: Array) -> Array:
+    plain = type(values) is np.ndarray and values.dtype == np.float64
+    return values if plain else numbers(values)

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.hygiene import frozen
 from actuator_glue.hygiene.checks import where
-from actuator_glue.hygiene.impulses import NONE, Impulses, beyond, find, in_command
+from actuator_glue.hygiene.impulses import NONE, Impulses, Motion, beyond, find, in_command
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.inference.least_squares.fit import base_fit, fit
@@ -68,13 +68,8 @@ def without_impulses(
         output = model.simulate(theta[None], record, initial=initial, origin=origin)[0]
         measured = record.measured.copy()
         measured[before.samples] += before.sizes
-        speed = np.abs(np.gradient(output, record.period))
-        # Far by the reading, too: a dropped-out channel is off only where the piston is far out.
-        far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, measured)))
         moving = slice(_unsettled(record, initial), None)
-        sizes = (speed[moving], far[moving])
-        phase = _phase(output, measured)[moving]
-        found = find((measured - output)[moving], sizes, record.period, phase)
+        found = _found(output, measured, record.period, moving)
         found = replace(found, samples=found.samples + moving.start)
         if np.array_equal(found.samples, before.samples):
             found = before
@@ -89,6 +84,18 @@ def without_impulses(
         records.append(record)
         all_.append(found)
     return _with(data, records), tuple(all_)
+
+
+def _found(output: Array, measured: Array, period: float, moving: slice) -> Impulses:
+    """Return the impulses of a measured displacement (n,) beside what a model says (n,) [m]."""
+
+    def motion() -> Motion:
+        speed = np.abs(np.gradient(output, period))
+        # Far by the reading, too: a dropped-out channel is off only where the piston is far out.
+        far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, measured)))
+        return Motion((speed[moving], far[moving]), _phase(output, measured)[moving])
+
+    return find((measured - output)[moving], motion, period)
 
 
 def _less(channel: Array, found: Impulses, share: float) -> Array:

@@ -9,8 +9,9 @@ the model lacks does not: it stands out of the residual by little.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -120,20 +121,28 @@ def _explained(error: Array, noise: Array, taps: Array) -> tuple[list[int], Arra
     return [chosen[i] for i in order], sizes[order]
 
 
-def find(
-    residual: Array, motion: Sequence[Array], period: float, phase: Array | None = None
-) -> Impulses:
+class Motion(NamedTuple):
+    """What an accident cannot depend on.
+
+    Attributes:
+        sizes: (n,) each: the speed of the piston, say.
+        phase: of the motion's cycle (n,) [rad]; NaN where a reading could be off at some phases
+            only.
+    """
+
+    sizes: Sequence[Array]
+    phase: Array | None = None
+
+
+def find(residual: Array, motion: Callable[[], Motion], period: float) -> Impulses:
     """Return the impulses of a residual.
 
     None where they are too many to be accidents, or come with the motion.
 
     Args:
         residual: of a model that was fitted, (n,) [m].
-        motion: quantities that an accident cannot depend on, (n,) each: the speed of the piston,
-            say.
+        motion: returns that of the same samples; asked only where something stands out.
         period: time between samples [s].
-        phase: of the motion's cycle (n,) [rad], on which an accident cannot depend either; NaN
-            where a reading could be off at some phases only.
     """
     if len(residual) < 40 * _REACH:
         return NONE
@@ -157,9 +166,10 @@ def find(
         samples += [part.start + i for i in found[0]]
         sizes += list(found[1])
         starts += [part.start + found[0][i] for i in runs]
-    if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, motion):
+    if not samples or len(samples) > _MOST * len(residual):
         return NONE
-    if phase is not None and _at_a_phase(phase[starts], phase):
+    sizes_of, phase = motion()
+    if _with_motion(starts, sizes_of) or (phase is not None and _at_a_phase(phase[starts], phase)):
         return NONE
     return Impulses(np.array(samples, dtype=np.intp), np.array(sizes), len(starts))
 

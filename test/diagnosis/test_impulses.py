@@ -49,13 +49,14 @@ def test_a_motion_that_comes_and_goes_once_is_no_impulse(length: int, seed: int)
     (Of 400 humps of each length 5, 5 and 3 were impulses, by their noise; no drop-out was missed.)
     """
     residual = NOISE * np.random.default_rng(seed).standard_normal(len(T))
-    still = [np.zeros(len(T))]
+    still = impulses.Motion([np.zeros(len(T))])
     at = slice(3000, 3000 + length)
     hump, box = residual.copy(), residual.copy()
     hump[at] += 20 * NOISE * np.sin(np.pi * np.arange(0.5, length) / length)
     box[at] += 20 * NOISE
-    assert impulses.find(hump, still, 1 / RATE).count == 0
-    assert impulses.find(box, still, 1 / RATE).samples.tolist() == list(range(at.start, at.stop))
+    assert impulses.find(hump, lambda: still, 1 / RATE).count == 0
+    found = impulses.find(box, lambda: still, 1 / RATE)
+    assert found.samples.tolist() == list(range(at.start, at.stop))
 
 
 @pytest.mark.parametrize('one_sided', [True, False])
@@ -129,9 +130,9 @@ def test_slips_are_no_impulses_whatever_their_phase(rng_seed: int) -> None:
     for at in release[2:-2]:
         error[at - 1 : at + 3] += np.sign(x[at]) * lag
     motion = np.abs(np.gradient(x)), np.abs(x)
-    assert impulses.find(error, motion, 2e-3).count > 30
+    assert impulses.find(error, lambda: impulses.Motion(motion), 2e-3).count > 30
     phase = np.arctan2(np.gradient(x) / np.gradient(x).std(), x / x.std())
-    assert impulses.find(error, motion, 2e-3, phase).count == 0
+    assert impulses.find(error, lambda: impulses.Motion(motion, phase), 2e-3).count == 0
 
 
 @pytest.mark.parametrize('dropped', [False, True])
@@ -181,7 +182,7 @@ def test_too_many_are_no_accidents() -> None:
     """What is off in a tenth of the samples is left as it is."""
     noise = NOISE * np.random.default_rng(6).standard_normal(4000)
     noise[::10] += 1e-4
-    assert impulses.find(noise, [np.ones(4000)], 1e-3).count == 0
+    assert impulses.find(noise, lambda: impulses.Motion([np.ones(4000)]), 1e-3).count == 0
 
 
 def test_what_passed_for_an_impulse_beside_another_model_is_restored(rng_seed: int) -> None:
