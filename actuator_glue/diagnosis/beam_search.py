@@ -29,6 +29,9 @@ _OPEN, _OPEN_TRIED = 1, 3
 # Names after which learned terms are tried: they may be plainer than further names.
 _NAMES = 2
 MOST_TERMS = 2
+# Squared error that signatures promise over that of a refit, at most: three at the most of some
+# hundred terms.
+_REFITTED = 4.0
 
 
 class BeamSearch(Judge):
@@ -72,11 +75,16 @@ class BeamSearch(Judge):
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=by_score)
 
-    def with_terms(self, starts: Sequence[Trial]) -> list[list[Trial]]:
-        """Refit structures with the learned terms that promise most beside each."""
-        return self.search.additions_to(
-            [Asked(start, tuple(self._promising_terms(start))) for start in starts]
-        )
+    def with_terms(self, starts: Sequence[Trial], below: float = math.inf) -> list[list[Trial]]:
+        """Refit structures with the learned terms that promise most beside each.
+
+        Args:
+            starts: the structures.
+            below: mean squared error that is of use [m^2]; terms whose signatures promise far
+                more are not refitted.
+        """
+        asked = [Asked(s, tuple(self._promising_terms(s, below)), below) for s in starts]
+        return self.search.additions_to(asked)
 
     def explained_by_term(self, current: Trial) -> bool:
         """Whether a learned term leaves nothing material, alone or added to the names found.
@@ -87,11 +95,13 @@ class BeamSearch(Judge):
         rows = self.with_terms((self.search.trial(()), current))
         return any(self.left(trial) < self.material for trial in itertools.chain(*rows))
 
-    def _promising_terms(self, current: Trial) -> list[str]:
+    def _promising_terms(self, current: Trial, below: float = math.inf) -> list[str]:
         if sum(map(is_learned, current.structure.entries)) >= MOST_TERMS:
             return []
         names = [n for n in self.search.terms() if n not in current.effects]
-        return self.search.screened(current, names)[: self.settings.terms]
+        promised = self.search.promised(current, names)
+        most = _REFITTED * below
+        return [n for n, left in promised if left < most][: self.settings.terms]
 
     def overlooked(self, current: Trial) -> list[Trial]:
         """Refit a structure with effects that only show once its members are in the model.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from actuator_glue.diagnosis import final_impulses, undetermined_motion
 from actuator_glue.diagnosis.candidates import mean_effects
@@ -54,7 +55,7 @@ def as_given(
 def _within(
     prepared: Prepared, asking: Asking, each: Each, effort: Effort, fixed: bool = False
 ) -> Conclusion:
-    """Search records with their hold.
+    """Search records with their hold, for names first.
 
     Samples that friction leaves to chance do not count, unless the counted samples are fixed. If
     the final model shows impulses that could have swayed the search, or that suspected ones are
@@ -62,45 +63,57 @@ def _within(
     """
     asking.tell('base fit', 0.0)
     begun = _begun(prepared, asking.settings, each, effort, fixed)
-    first = _moved(*begun, asking)
-    prepared, final = begun[0], first.found.final
+    begun, named = _judged_again(begun, _named(begun, asking), asking)
+    moved = follow(named, WITHIN, asking)
+    if moved.found is named.found:
+        return moved
+    _, again = _judged_again(begun, moved, asking)
+    return again if again is moved else follow(again, WITHIN, asking)
+
+
+def _judged_again(begun: _Begun, result: Conclusion, asking: Asking) -> tuple[_Begun, Conclusion]:
+    """Judge impulses against the final model; search on from its answer where they swayed it."""
+    prepared, final = begun.prepared, result.found.final
     clean = final_impulses.without_impulses(prepared, final)
-    if clean is prepared:
-        return first
     taken = prepared.fit.target - clean.fit.target
-    if not final_impulses.swayed(final.fit, first.scorer, taken):
-        return first
-    again = _begun(clean, asking.settings, each, effort, fixed=True)
-    return _moved(*again, asking, first)
+    if clean is prepared or not final_impulses.swayed(final.fit, result.scorer, taken):
+        return begun, result
+    search = begun.search
+    begun = _begun(clean, asking.settings, search.each, search.effort, fixed=True)
+    return begun, _named(begun, asking, result)
+
+
+class _Begun(NamedTuple):
+    """Records, the search of their samples that count, and hum that was removed from them."""
+
+    prepared: Prepared
+    search: Search
+    line: Line | None
 
 
 def _begun(
     prepared: Prepared, settings: Thresholds, each: Each, effort: Effort, fixed: bool
-) -> tuple[Prepared, Search, Line | None]:
+) -> _Begun:
     search = Search(prepared.fit, mean_effects(), each, effort=effort)
     line = hum.find(prepared.fit, search.base().error)
     if line is not None:
         data = hum.without(prepared.fit, line)
         search = Search(data, mean_effects(), each, effort=effort)
-    return *undetermined_motion.without(prepared, search, settings, fixed), line
+    return _Begun(*undetermined_motion.without(prepared, search, settings, fixed), line)
 
 
-def _moved(
-    prepared: Prepared,
-    search: Search,
-    line: Line | None,
-    asking: Asking,
-    before: Conclusion | None = None,
-) -> Conclusion:
-    settings, tell = asking.settings, asking.tell
+def _named(begun: _Begun, asking: Asking, before: Conclusion | None = None) -> Conclusion:
+    """Search for names, from those found `before` if given; hum is judged again in the end."""
+    (prepared, search, line), settings, tell = begun, asking.settings, asking.tell
     result = searched(prepared, search, line, settings, tell, before)
-    if line is not None and result.found.final.effects:
-        left = _line_left(prepared.fit, result.found.final)
-        if left is None or not left.same_as(line):
-            data = prepared.fit if left is None else hum.without(prepared.fit, left)
-            search = Search(data, search.names, search.each, effort=search.effort)
-            result = searched(prepared, search, left, settings, tell, result)
-    return follow(result, WITHIN, asking)
+    if line is None or not result.found.final.effects:
+        return result
+    left = _line_left(prepared.fit, result.found.final)
+    if left is not None and left.same_as(line):
+        return result
+    data = prepared.fit if left is None else hum.without(prepared.fit, left)
+    search = Search(data, search.names, search.each, effort=search.effort)
+    return searched(prepared, search, left, settings, tell, result)
 
 
 def _line_left(data: Data, final: Trial) -> Line | None:

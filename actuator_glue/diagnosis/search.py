@@ -381,14 +381,21 @@ class Search:
         known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
         return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
 
-    def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
-        """Sort effects by what their signatures could remove from the present residual.
+    def promised(
+        self, current: Trial, names: Iterable[str], *, beside: bool = False
+    ) -> list[tuple[str, float]]:
+        """Sort effects by the mean squared error that their signatures promise to leave [m^2].
 
         Those with Eq. (2) alone, or `beside` the present effects, which takes as long as refits.
         """
         wanted = list(names)
         shares = list(self.each(lambda n: self.screen(current, n, beside=beside)[0], wanted))
-        return [wanted[i] for i in np.argsort(-np.array(shares), kind='stable')]
+        left = [(n, (1.0 - s) * current.mean_square) for n, s in zip(wanted, shares, strict=True)]
+        return sorted(left, key=lambda pair: pair[1])
+
+    def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
+        """Sort effects by what their signatures promise, as `promised`."""
+        return [name for name, _ in self.promised(current, names, beside=beside)]
 
     def without_each(self, current: Trial) -> list[Trial]:
         """Refit a structure with each of its effects taken away, in their order, as `without`."""

@@ -21,7 +21,7 @@ from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.moves import names_beside_term
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.search import FAR, Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -119,7 +119,7 @@ def instead(selection: BeamSearch, found: Selection) -> Selection | None:
     """
     search, base = selection.search, selection.search.trial(())
     selection.progress('learned term', 0.0)
-    (tried,) = selection.with_terms([base])
+    (tried,) = selection.with_terms([base], FAR * found.final.mean_square)
     whole = [t for t in tried if selection.left(t) < selection.material]
     if not whole:
         return None
@@ -207,7 +207,9 @@ def _additions(
     """Return the best structure with one more term, where it is worth more than the present."""
     search, worth = selection.search, list[Trial]()
     cost = math.log(len(search.terms()))
-    rows = selection.with_terms(starts)
+    # While something remains, a term may be of use that only further names make better than these.
+    below = selection.may_matter_below(best) if complete else math.inf
+    rows = selection.with_terms(starts, below)
     plain = any(selection.left(trial) < selection.material for row in rows for trial in row)
     for start, row in zip(starts, rows, strict=True):
         for trial in row:
