@@ -27,18 +27,32 @@ ROOMS = (
     'nodes',
     'cli',
 )
+# Rooms of the diagnosis; each knows only those above it (test/test_architecture.py).
+DIAGNOSIS = (
+    'learned',
+    'score',
+    'scopes',
+    'samples',
+    'measured',
+    'refits',
+    'search',
+    'moves',
+    'posterior',
+    'verdict',
+    'telling',
+)
 # What strangers ask for, and the file that answers.
 QUESTIONS = (
     ('swapped channels, a wrong sign or unit are refused', 'hygiene/checks.py'),
     ('impulses are removed before a fit', 'hygiene/despike.py'),
-    ('impulses are judged against the final model', 'diagnosis/final_impulses.py'),
+    ('impulses are judged against the final model', 'diagnosis/samples/final_impulses.py'),
     ('the hold of the command is chosen', 'diagnosis/moves/other_hold.py'),
     ('an effect is found that began during a test', 'diagnosis/moves/since_onset.py'),
-    ('a structure is weighed', 'diagnosis/weights.py'),
-    ('all structures stand that were refitted', 'diagnosis/table.py'),
-    ('a tie is told', 'diagnosis/ties.py'),
-    ('the verdict is reached', 'diagnosis/verdict.py'),
-    ('the headline is written', 'diagnosis/headline.py'),
+    ('a structure is weighed', 'diagnosis/score/weights.py'),
+    ('all structures stand that were refitted', 'diagnosis/search/table.py'),
+    ('a tie is told', 'diagnosis/search/ties.py'),
+    ('the verdict is reached', 'diagnosis/verdict/verdict.py'),
+    ('the headline is written', 'diagnosis/telling/headline.py'),
     ('a window becomes a posterior', 'online/sampling.py'),
     ('records, model and likelihood become a posterior', 'inference/posterior.py'),
     ('one effect is defined, all of it', 'model/effects/catalogue/backlash.py'),
@@ -82,12 +96,21 @@ def _rooms() -> Iterator[str]:
 
 
 def _files(folder: Path) -> Iterator[str]:
-    yield '| file | what it holds | lines |'
-    yield '|---|---|---:|'
-    for path in sorted(folder.rglob('*.py'), key=lambda p: (p.parent != folder, p)):
+    for path in sorted(folder.glob('*.py')):
         if path.name != '__init__.py':
-            name = path.relative_to(folder).as_posix()
-            yield f'| `{name}` | {first_paragraph(path)} | {sizes(path)[0]} |'
+            yield f'- `{path.name}` ({sizes(path)[0]}): {first_paragraph(path)}'
+
+
+def _diagnosis() -> Iterator[str]:
+    folder = PACKAGE / 'diagnosis'
+    yield 'Rooms in the order in which data go through them, each file with its number of lines;'
+    yield '`diagnose.py` is the whole in a page.\n'
+    yield from _files(folder)
+    for name in DIAGNOSIS:
+        lines, code = map(sum, zip(*map(sizes, (folder / name).glob('*.py')), strict=True))
+        says = first_paragraph(folder / name / '__init__.py')
+        yield f'\n### {name}/\n\n{says} {lines} lines, {code} of them code.\n'
+        yield from _files(folder / name)
 
 
 def page() -> str:
@@ -99,8 +122,8 @@ def page() -> str:
         *_rooms(),
         '\n## Where to look\n',
         *asked,
-        '\n## The diagnosis, file by file\n',
-        *_files(PACKAGE / 'diagnosis'),
+        '\n## The diagnosis, room by room\n',
+        *_diagnosis(),
     )
     return '\n'.join(parts) + '\n'
 

@@ -107,6 +107,32 @@ ARROWS = {
     'campaigns': EVERYTHING | {'api'},
     'cli': EVERYTHING | {'api', 'arguments', 'campaigns'},
 }
+# Rooms of the diagnosis: data go down this list, and each may import those above it, and what all
+# of them share.
+SHARED = {
+    'effort',
+    'estimate',
+    'finding',
+    'remembered',
+    'selection',
+    'stages',
+    'thresholds',
+    'trial',
+    'verdicts',
+}
+DIAGNOSIS = [
+    'learned',
+    'score',
+    'scopes',
+    'samples',
+    'measured',
+    'refits',
+    'search',
+    'moves',
+    'posterior',
+    'verdict',
+    'telling',
+]
 # All below io but jit, which keeps compiled code in files.
 PURE = (
     'errors',
@@ -184,6 +210,23 @@ def test_imports_follow_the_arrows() -> None:
         if module.startswith('actuator_glue.')
         and module.split('.')[1] not in ARROWS[folder_of(path)] | {folder_of(path), '__version__'}
     ]
+
+
+def test_rooms_of_the_diagnosis_follow_the_data() -> None:
+    """What is told rests on a verdict, a verdict on draws, draws on what the search concluded."""
+    found = []
+    for path in SOURCES:
+        parts = path.relative_to(ROOT).with_suffix('').parts
+        if parts[0] != 'diagnosis' or parts[1] in ('diagnose', 'pipeline', '__init__'):
+            continue
+        above = DIAGNOSIS[: DIAGNOSIS.index(parts[1]) + 1] if parts[1] in DIAGNOSIS else []
+        for module, line in imports(path):
+            names = module.split('.')
+            if names[:2] != ['actuator_glue', 'diagnosis']:
+                continue
+            if len(names) < 3 or names[2] not in SHARED | set(above):
+                found.append(f'{identifier(path)}:{line} imports {module}')
+    assert not found
 
 
 def test_ros_is_imported_in_nodes_only() -> None:

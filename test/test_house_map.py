@@ -15,6 +15,8 @@ def test_every_question_has_a_file() -> None:
         assert (HOUSE['PACKAGE'] / file).is_file(), file
     folders = {p.parent.name for p in HOUSE['PACKAGE'].glob('*/__init__.py')}
     assert folders == set(HOUSE['ROOMS'])
+    rooms = {p.parent.name for p in HOUSE['PACKAGE'].glob('diagnosis/*/__init__.py')}
+    assert rooms == set(HOUSE['DIAGNOSIS'])
 
 
 def test_the_page_is_of_these_files() -> None:

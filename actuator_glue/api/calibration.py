@@ -21,8 +21,8 @@ from actuator_glue.api.given import Records, Stiffness, records_given
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.prior import given_prior
 from actuator_glue.api.tracking import records_tracking
-from actuator_glue.diagnosis.force import check_forces
-from actuator_glue.diagnosis.residual_structure import residual_structure
+from actuator_glue.diagnosis.samples.force import check_forces
+from actuator_glue.diagnosis.verdict.residual_structure import residual_structure
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.clean import clean, common_initial
 from actuator_glue.hygiene.despike import despiked

@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
 from actuator_glue.api.tracking import RecordTracking
-from actuator_glue.diagnosis.residual_structure import ResidualStructure
+from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.predictive import ResidualModel

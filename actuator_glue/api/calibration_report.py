@@ -11,7 +11,7 @@ from actuator_glue.api import judgement, tracking
 from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.calibration_parts import FitError, Marginal
 from actuator_glue.api.ensemble import evenly, simulated
-from actuator_glue.diagnosis.residual_structure import ResidualStructure
+from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.api.calibration_options import CalibrationOptions
-from actuator_glue.diagnosis.force import with_forces
+from actuator_glue.diagnosis.samples.force import with_forces
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.effective_size import effective_size
 from actuator_glue.inference.least_squares.data import Data

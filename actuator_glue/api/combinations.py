@@ -19,7 +19,7 @@ from actuator_glue.api.given import Records, records_given
 from actuator_glue.api.matlab import Exported, TransferFunction, write_mat
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
-from actuator_glue.diagnosis.residual_structure import DIAGNOSE
+from actuator_glue.diagnosis.verdict.residual_structure import DIAGNOSE
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import pull
 from actuator_glue.hygiene.unlike_rest import unlike_rest

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.api.tracking import RecordTracking
-from actuator_glue.diagnosis.residual_structure import ResidualStructure
+from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.records import Array, Record
 
 # Of the transfer function of Eq. (2), b / (s^2 + a s + b + c), in the order of the draws.

@@ -28,10 +28,10 @@ from actuator_glue.api.provenance import provenance
 from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Estimate, Json
-from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.remembered import Before, Remembered
-from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
+from actuator_glue.diagnosis.telling.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.verdict.first_look import FirstLook
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers

@@ -11,8 +11,9 @@ import numpy as np
 from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.ensemble import SIZE
 from actuator_glue.api.inference_groups import BLOCK, SAMPLES, GroupColumn, at_step, dataset
-from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.result import DiagnosisData, Trace
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.telling.result import DiagnosisData
+from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.hybrid.actuator import table_of
 from actuator_glue.inference.least_squares.data import Data, chunks
 from actuator_glue.inference.predictive import ResidualModel, predictive_draws

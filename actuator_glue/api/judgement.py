@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.api.calibration_parts import FitError, Marginal
-from actuator_glue.diagnosis.residual_structure import ResidualStructure
+from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.records import Array, Record

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
-from actuator_glue.diagnosis.response import amplitude_of, harmonic
+from actuator_glue.diagnosis.telling.response import amplitude_of, harmonic
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking

@@ -15,7 +15,7 @@ from actuator_glue.campaigns.history_data import HistoryData, Outlier
 from actuator_glue.campaigns.pooling import Pooled, pooled
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import Series, series_of, tests_of
-from actuator_glue.diagnosis.held_out import COMPLETE
+from actuator_glue.diagnosis.verdicts import COMPLETE
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_glue.diagnosis.held_out import COMPLETE
+from actuator_glue.diagnosis.verdicts import COMPLETE
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array

@@ -7,18 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import both_parts, wrong_setup
-from actuator_glue.diagnosis.answer_posterior import sampled
 from actuator_glue.diagnosis.effort import Effort
-from actuator_glue.diagnosis.first_look import FirstLook
-from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.pipeline import as_given, conclude
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.posterior.answer_posterior import sampled
 from actuator_glue.diagnosis.remembered import Before, Remembered
-from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.samples.force import check_forces
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.scopes import wrong_setup
 from actuator_glue.diagnosis.stages import Progress, ShareDone, Stage
-from actuator_glue.diagnosis.telling import told
+from actuator_glue.diagnosis.telling.result import DiagnosisData
+from actuator_glue.diagnosis.telling.telling import told
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.verdict import both_parts
+from actuator_glue.diagnosis.verdict.first_look import FirstLook
 from actuator_glue.inference.least_squares.base_prior import BasePrior
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import base_fit

@@ -66,7 +66,7 @@ class Finding:
         plausible: an interval of its sizes excludes the neutral value; where none does, its
             probability is less.
         agrees_across_windows: its leading parameter is the same in all halves of the records
-            that fix it; None where fewer than two do (see diagnosis/agreement.py).
+            that fix it; None where fewer than two do (see diagnosis/posterior/agreement.py).
         windows: the leading parameter in each of these halves [unit of the parameter].
         records: sources of the records that alone have it; empty where all do.
         cause: catalogue effect of which a learned term is another shape, where the nearest name

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from actuator_glue.diagnosis import final_impulses, undetermined_motion
-from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.moves.registry import ACROSS, WITHIN
-from actuator_glue.diagnosis.preparation import Prepared
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.candidates import mean_effects
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.samples import final_impulses
+from actuator_glue.diagnosis.samples.preparation import Prepared
+from actuator_glue.diagnosis.search import undetermined_motion
+from actuator_glue.diagnosis.search.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial

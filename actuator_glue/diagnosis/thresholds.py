@@ -13,7 +13,7 @@ class Thresholds:
         noise_share: an effect is material where it removes more than this share of the noise rms,
         stroke_share: and more than this share of the command's amplitude.
         later_share: where most is explained, a further effect must remove this share of it.
-        false_alarms: probability of an addition on a healthy machine (diagnosis/false_alarms.py).
+        false_alarms: probability of an addition on a healthy machine (score/false_alarms.py).
         nats: smallest out-of-sample evidence for another set-up or a generic surrogate.
         tie_nats: two effects cannot be told apart where their weights differ by less.
         tie_share: between equations for the same thing an error of this share of what they remove
@@ -28,7 +28,7 @@ class Thresholds:
         tried: refits per structure after the first stage, best screened first.
         terms: the same of learned terms.
         effort: work of all refits after which no further search is begun (diagnosis/effort.py).
-        use_force: the recorded force chooses among tied names (diagnosis/force_ranking.py).
+        use_force: the recorded force chooses among tied names (search/force_ranking.py).
     """
 
     noise_share: float = 0.5

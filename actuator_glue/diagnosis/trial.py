@@ -21,7 +21,7 @@ class Trial:
         added: the effect that was added last.
         fit: base and effects refitted together.
         scores: out-of-sample log density of every block (B,) [nats].
-        own: the model where it is not `structure` (see diagnosis/one_record.py).
+        own: the model where it is not `structure` (see diagnosis/scopes/one_record.py).
     """
 
     structure: Structure

@@ -7,7 +7,8 @@ import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from actuator_glue.diagnosis.result import DiagnosisData, Trace
+from actuator_glue.diagnosis.telling.result import DiagnosisData
+from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.records import Array, source_name
 from actuator_glue.report import style
 from actuator_glue.report.quantity import said_in

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.json_value import Json
 from actuator_glue.online.stream import structure_name
 from actuator_glue.records import source_name

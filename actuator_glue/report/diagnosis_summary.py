@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.diagnosis_figures import residual_summary
 from actuator_glue.report.first_page import FirstPage, command

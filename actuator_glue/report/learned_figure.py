@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from actuator_glue.diagnosis.learned.sizes import DIMENSIONS, unit_text
 from actuator_glue.diagnosis.learned.term import LearnedTerm
-from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.model.effects.terms.entry import along
 from actuator_glue.model.effects.terms.expression import MEMORY, PLACES, SIGNAL
 from actuator_glue.model.effects.terms.filters import FILTERS

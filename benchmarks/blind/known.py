@@ -42,13 +42,13 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     import numpy as np
     from equivalents import OTHERWISE
 
-    from actuator_glue.diagnosis import posterior
-    from actuator_glue.diagnosis.candidates import mean_effects
-    from actuator_glue.diagnosis.discrepancy import beside, responses
-    from actuator_glue.diagnosis.preparation import prepare
-    from actuator_glue.diagnosis.ridge import left_open
-    from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
-    from actuator_glue.diagnosis.search import Search
+    from actuator_glue.diagnosis.posterior import posterior
+    from actuator_glue.diagnosis.posterior.discrepancy import beside, responses
+    from actuator_glue.diagnosis.posterior.ridge import left_open
+    from actuator_glue.diagnosis.refits.candidates import mean_effects
+    from actuator_glue.diagnosis.refits.structures import Search
+    from actuator_glue.diagnosis.samples.preparation import prepare
+    from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
     from actuator_glue.diagnosis.thresholds import Thresholds
     from actuator_glue.inference.least_squares.fit import fit
     from actuator_glue.inference.least_squares.space import Space

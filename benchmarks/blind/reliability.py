@@ -21,7 +21,7 @@ from equivalents import OTHERWISE, catalogued
 from score import share
 from statsmodels.stats.proportion import proportion_confint
 
-from actuator_glue.diagnosis import reliability
+from actuator_glue.diagnosis.score import reliability
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.report import style
 

@@ -2,9 +2,9 @@
 
 Campaigns leave the table of all structures that each diagnosis refitted. Here a rule chooses from
 it again, without any refit: a minute for hundreds of machines. The rule is the weight that the
-diagnosis goes by (actuator_glue/diagnosis/weights.py), with another error that tells if asked
-for. It is held against the structure that was told: how often both agree, how often either is the
-machine's, and what either leaves of the held-out record.
+diagnosis goes by (`diagnosis/score/weights.py`), with another error that tells if asked for. It is
+held against the structure that was told: how often both agree, how often either is the machine's,
+and what either leaves of the held-out record.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from equivalents import catalogued
 from reliability import answers
 from score import row_weights, share
 
-from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.weights import TELLING
+from actuator_glue.diagnosis.refits.candidates import mean_effects
+from actuator_glue.diagnosis.score.weights import TELLING
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from case import Case
 
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure

@@ -11,7 +11,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.model.parameters import NAMES

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from actuator_glue.diagnosis.result import DiagnosisData, Trace
+from actuator_glue.diagnosis.telling.result import DiagnosisData
+from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import BASE
 from actuator_glue.online.job import WindowResult

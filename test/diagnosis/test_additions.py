@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 

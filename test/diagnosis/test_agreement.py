@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.agreement import agreement, between
-from actuator_glue.diagnosis.regression import Surrogate, compare
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.posterior.agreement import agreement, between
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.regression import Surrogate, compare
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure

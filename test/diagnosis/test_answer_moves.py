@@ -12,7 +12,7 @@ import two_sweeps
 
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.moves.move import AnswerMove, follow
-from actuator_glue.diagnosis.search_step import SearchStep
+from actuator_glue.diagnosis.selection import SearchStep
 
 
 @dataclass(frozen=True)

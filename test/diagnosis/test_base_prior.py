@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 from test_diagnose import QUICK, THETA, make
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.global_search import Shares
+from actuator_glue.diagnosis.refits.global_search import Shares
 from actuator_glue.diagnosis.remembered import Before
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried

@@ -7,11 +7,11 @@ import pytest
 from scipy import signal
 from trials import THETA, entries, trial
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.moves import describe
-from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.moves import learned_terms
+from actuator_glue.diagnosis.refits.candidates import mean_effects
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -117,7 +117,7 @@ def test_a_term_takes_no_place_of_what_has_a_name(
     best = trial(('flow-asymmetry',), named)
     both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
     found = Displaced(term)
-    assert describe._displaces(found, both, best) is displaces
+    assert learned_terms._displaces(found, both, best) is displaces
 
 
 @pytest.mark.parametrize('seed', [1, 2])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from actuator_glue.diagnosis.likelihood import inflation, most_likely
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior.likelihood import most_likely
+from actuator_glue.diagnosis.score.scorer import Scorer, inflation, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model import commands

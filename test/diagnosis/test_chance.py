@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import undetermined_motion
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.global_search import Shares
+from actuator_glue.diagnosis.refits.global_search import Shares
+from actuator_glue.diagnosis.search import undetermined_motion
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares import data as of_data
 from actuator_glue.inference.least_squares.data import Data

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis import companions, discrepancy, mixed_draws, posterior
-from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.moves.that_matter import that_matter
-from actuator_glue.diagnosis.posterior import Draws
+from actuator_glue.diagnosis.posterior import answer_posterior, discrepancy, mixed_draws, posterior
+from actuator_glue.diagnosis.posterior.posterior import Draws
+from actuator_glue.diagnosis.search import companions
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.telling import companion_notes
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Record
@@ -56,7 +58,7 @@ def test_what_does_not_matter_is_held_beside() -> None:
     assert found.final.effects == ('viscous-damping',)
     larger = companions.with_companions(selection, found.final)
     assert larger.effects == ('viscous-damping', 'specimen-gap')
-    draws = companions.reduced(
+    draws = answer_posterior.reduced(
         sampled(selection, found, larger), larger, found.final, [True] * 4 + [False]
     )
     assert draws.unmet == (False, False, False, False, True)  # what is open stays open
@@ -65,10 +67,10 @@ def test_what_does_not_matter_is_held_beside() -> None:
     low, high = np.quantile(draws.points[:, 4], [0.025, 0.975])
     assert abs(0.5 * (low + high) - DAMPING) < 5.0 * (high - low) / 3.92
     held = selection.search.data  # what it leaves there is known
-    (sentence,) = companions.sentences(found.final, larger, held, missed=False)
+    (sentence,) = companion_notes.sentences(found.final, larger, held, missed=False)
     assert sentence.startswith('specimen-gap may be there, too')
     assert sentence.endswith('less than what matters; intervals allow for it')
-    (sentence,) = companions.sentences(found.final, larger, held, missed=True)
+    (sentence,) = companion_notes.sentences(found.final, larger, held, missed=True)
     left = 1e6 * larger.fit.rms, 1e6 * found.final.fit.rms
     assert sentence.endswith('leaves {:.1f} um with it, {:.1f} um without'.format(*left))
 
@@ -103,7 +105,7 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
     assert abs(beside[1] - true) < 5.0 * (beside[2] - beside[0]) / 3.92
     assert without[2] < 0.93 * true
     held = selection.search.data
-    (sentence,) = companions.sentences(found.final, larger, held, missed=False)
+    (sentence,) = companion_notes.sentences(found.final, larger, held, missed=False)
     assert sentence.startswith(f'{larger.effects[-1]} (or what is like it) may be there, too')
 
 
@@ -126,7 +128,7 @@ def test_nothing_is_held_beside_without_it(
     for selection, found in without_gap:
         assert found.final.effects == ('viscous-damping',)
         larger = companions.with_companions(selection, found.final)
-        assert companions.sentences(larger, larger, selection.search.data, True) == ()
+        assert companion_notes.sentences(larger, larger, selection.search.data, True) == ()
         held.append(larger is not found.final)
     assert not any(held)
 
@@ -170,8 +172,8 @@ def test_what_the_held_out_part_shows_is_hinted_at(rng_seed: int) -> None:
         Record(v, y, 1 / two_sweeps.RATE, stiffness=k)
         for k, v, y in two_sweeps.motions(effects, theta, 10.0 * u, stiffness)
     ]
-    (sentence,) = companions.hint(selection, found.final, Data.whole(loud))
+    (sentence,) = companion_notes.hint(selection, found.final, Data.whole(loud))
     assert sentence.startswith('viscous-damping (or what is like it) is not added')
     left = re.findall(r'([\d.]+) um with', sentence)
     assert float(left[0]) < 0.5 * float(left[1])
-    assert companions.hint(selection, found.final, selection.search.data) == ()
+    assert companion_notes.hint(selection, found.final, selection.search.data) == ()

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from trials import entries
 
-from actuator_glue.diagnosis import fitting_verdict
+from actuator_glue.diagnosis.search import fitting_verdict
 from actuator_glue.model.structure import Structure
 
 NAMED, LEARNED = 'backlash', 'learned-sensor-y3'

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis import discrepancy, posterior
-from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.posterior import discrepancy, posterior
+from actuator_glue.diagnosis.refits.candidates import mean_effects
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model import commands

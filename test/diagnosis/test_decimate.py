@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.detect import ljung_box
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.verdict.detect import ljung_box
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure

@@ -9,8 +9,9 @@ import pytest
 
 import actuator_glue as ag
 from actuator_glue.api.tracking import records_tracking
-from actuator_glue.diagnosis import discrepancy, posterior, response
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior import discrepancy, posterior
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.telling import response
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model import commands

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import posterior
-from actuator_glue.diagnosis.discrepancy import _PRIOR, _SCALES, beside
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior import posterior
+from actuator_glue.diagnosis.posterior.discrepancy import _PRIOR, _SCALES, beside
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares import space as working
 from actuator_glue.inference.least_squares.data import Data

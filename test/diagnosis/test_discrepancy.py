@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from actuator_glue.diagnosis.discrepancy import _SCALES, Discrepancy, beside, responses
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.posterior.discrepancy import _SCALES, Discrepancy, beside, responses
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure

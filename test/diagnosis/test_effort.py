@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.verdict.first_look import FirstLook
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 

@@ -3,10 +3,10 @@
 import pytest
 import scipy
 
-from actuator_glue.diagnosis import told_effects
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.reliability import calibrated
+from actuator_glue.diagnosis.score.reliability import calibrated
+from actuator_glue.diagnosis.verdict import findings
 
 
 def size(lower: float, upper: float, neutral: float | None) -> Estimate:
@@ -18,7 +18,7 @@ def size(lower: float, upper: float, neutral: float | None) -> Estimate:
 def test_a_name_whose_size_may_be_nothing_is_not_sure(far: float) -> None:
     """All names in its place keep their odds, and none of these has the rest."""
     rows = [Rival(n, 0.0, 0.0, 0.0, True, p) for n, p in (('delay', 0.9), ('sensor-lag', 0.1))]
-    told = told_effects._told(rows, 0.95, [size(far - 2.0, far + 2.0, 0.0)])
+    told = findings._told(rows, 0.95, [size(far - 2.0, far + 2.0, 0.0)])
     side = float(scipy.stats.norm.cdf(far))
     assert sum(r.probability for r in told) == pytest.approx(calibrated(0.95 * side))
     assert told[1].probability / told[0].probability == pytest.approx(1 / 9)
@@ -38,5 +38,5 @@ def test_a_name_whose_size_may_be_nothing_is_not_sure(far: float) -> None:
 )
 def test_an_interval_without_the_neutral_value(sizes: list[Estimate], excluded: bool) -> None:
     """One of those that say how much there is must exclude it."""
-    found = any(map(told_effects._excludes_neutral, told_effects._how_much(sizes)))
+    found = any(map(findings._excludes_neutral, findings._how_much(sizes)))
     assert found is excluded

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.inference.least_squares import data as module
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.decimate import means

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.identifiable import Working, derivatives
+from actuator_glue.diagnosis.posterior.identifiable import Working, derivatives
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.least_squares import fit as module
 from actuator_glue.inference.least_squares.base_prior import BasePrior

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import force_ranking
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
-from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.samples.force import newtons_per_metre, with_forces
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.search import force_ranking
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis import forecast
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score import forecast
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model import commands

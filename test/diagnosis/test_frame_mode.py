@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.candidates import mean_effects
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.decimate import means
 from actuator_glue.inference.least_squares.free_run import _decimated, parts

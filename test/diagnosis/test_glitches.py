@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.hygiene import glitches
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure

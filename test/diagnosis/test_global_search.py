@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits import global_search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, fit

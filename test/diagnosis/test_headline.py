@@ -9,14 +9,21 @@ import pytest
 
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
-from actuator_glue.diagnosis.advice import contradicted, zeros
-from actuator_glue.diagnosis.alarm import Alarm
 from actuator_glue.diagnosis.finding import Finding, Rival
-from actuator_glue.diagnosis.headline import headline
-from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
-from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.verdict import against, certainty, misses, named, of_both_parts
-from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.telling.advice import contradicted, zeros
+from actuator_glue.diagnosis.telling.headline import headline
+from actuator_glue.diagnosis.telling.result import DiagnosisData
+from actuator_glue.diagnosis.verdict.detect import Alarm
+from actuator_glue.diagnosis.verdict.held_out import HeldOutError
+from actuator_glue.diagnosis.verdict.verdict import (
+    against,
+    certainty,
+    misses,
+    named,
+    of_both_parts,
+)
+from actuator_glue.diagnosis.verdicts import Verdict
 from actuator_glue.model.effects import CATALOGUE
 
 NONE = np.empty((0, 4))

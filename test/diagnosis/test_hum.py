@@ -8,7 +8,7 @@ import pytest
 from actuator_glue.api.simulation import Command, Sensors, simulate
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.measured import hum
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.posterior import identified, opened
-from actuator_glue.diagnosis.ridge import left_open
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior.posterior import identified, opened
+from actuator_glue.diagnosis.posterior.ridge import left_open
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.least_squares.base_prior import BasePrior

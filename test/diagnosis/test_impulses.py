@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import final_impulses
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples import final_impulses
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.hygiene import impulses
 from actuator_glue.hygiene.despike import despiked, trimmed, without_impulses

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from two_sweeps import RATE, selected_of, sweep
 
-from actuator_glue.diagnosis.moves import describe
+from actuator_glue.diagnosis.moves import learned_terms
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -23,7 +23,7 @@ def test_a_name_is_found_beside_a_description() -> None:
         machine.append((k, u, model.simulate(theta, Record(given, given, 1.0 / RATE, k))))
     selection, found = selected_of(NAMES, machine)
     assert found.left > 2.0 * found.material
-    told = describe.learned(selection, found)
+    told = learned_terms.learned(selection, found)
     assert told is not None
     assert told.final.effects == ('sensor-lag', 'learned-command-u-absr')
     assert told.left < told.material

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.learned.forms import forms
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects.effect import Scale

@@ -5,13 +5,13 @@ import pytest
 from scipy import signal
 from smooth_machines import piston
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import described
-from actuator_glue.diagnosis.moves.describe import _plainer
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.moves.learned_terms import _plainer
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.likelihood import most_likely
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior.likelihood import most_likely
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, fit
 from actuator_glue.inference.least_squares.free_run import Model

@@ -5,9 +5,11 @@ from typing import Any
 import pytest
 from test_diagnose import make
 
-from actuator_glue.diagnosis import advice, companions, posterior
-from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.posterior import posterior
+from actuator_glue.diagnosis.search import companions
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.telling import advice
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference import importance
 

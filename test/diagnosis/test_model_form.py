@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import model_form
+from actuator_glue.diagnosis.posterior import model_form
 from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model.structure import Structure
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis import response
-from actuator_glue.diagnosis.next_experiment import ranked
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.telling import response
+from actuator_glue.diagnosis.telling.next_experiment import ranked
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model import commands
 from actuator_glue.model.effects import scale

@@ -12,10 +12,10 @@ import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.moves.since_onset import _since
-from actuator_glue.diagnosis.onset.moments import SHORTEST, Moment
-from actuator_glue.diagnosis.onset.onset import Appeared, dated
-from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.scopes.moments import SHORTEST, Moment
+from actuator_glue.diagnosis.scopes.onset import Appeared, dated
+from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from actuator_glue.diagnosis.discrepancy import Discrepancy
-from actuator_glue.diagnosis.identifiable import coordinates
-from actuator_glue.diagnosis.likelihood import Likelihood
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior.discrepancy import Discrepancy
+from actuator_glue.diagnosis.posterior.identifiable import coordinates
+from actuator_glue.diagnosis.posterior.likelihood import Likelihood
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model import commands

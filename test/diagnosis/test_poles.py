@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis import poles, posterior
-from actuator_glue.diagnosis.discrepancy import beside
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.posterior import posterior
+from actuator_glue.diagnosis.posterior.discrepancy import beside
+from actuator_glue.diagnosis.refits import poles
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.inference.least_squares.space import Space

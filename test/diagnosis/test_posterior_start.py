@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from test_diagnose import QUICK, make
 
-from actuator_glue.diagnosis import advice, posterior
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.identifiable import Working
+from actuator_glue.diagnosis.posterior import posterior
+from actuator_glue.diagnosis.posterior.identifiable import Working
+from actuator_glue.diagnosis.telling import advice
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model.structure import Structure

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import check
 from actuator_glue.hygiene.clean import initial_state

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from actuator_glue.diagnosis import proposals
-from actuator_glue.diagnosis.discrepancy import ScaleMixture
+from actuator_glue.diagnosis.posterior import proposals
+from actuator_glue.diagnosis.posterior.discrepancy import ScaleMixture
 from actuator_glue.inference import importance
 
 LEAST, MEAN, SD = 1e-6, 0.02, 0.05

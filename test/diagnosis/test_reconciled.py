@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import discrepancy, held_out_reach, posterior
-from actuator_glue.diagnosis.held_out_look import Side
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.posterior import discrepancy, posterior
+from actuator_glue.diagnosis.posterior.answer_posterior import Side
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.verdict import held_out_reach
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record

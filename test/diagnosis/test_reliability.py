@@ -3,7 +3,7 @@
 import pytest
 
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.reliability import calibrated, share_of, sureness
+from actuator_glue.diagnosis.score.reliability import calibrated, share_of, sureness
 
 
 def test_more_weight_is_never_less_probable_and_never_certain() -> None:

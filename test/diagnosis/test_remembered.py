@@ -10,10 +10,10 @@ import pytest
 
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.moves.move import AnswerMove, always
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.remembered import Remembered
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.commands import noise
 from actuator_glue.model.structure import Structure

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from actuator_glue.api.simulation import Command, Sensors, simulate
-from actuator_glue.diagnosis.residual_structure import ResidualStructure, residual_structure
+from actuator_glue.diagnosis.verdict.residual_structure import (
+    ResidualStructure,
+    residual_structure,
+)
 from actuator_glue.hygiene.clean import initial_state
 from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.least_squares.data import SETTLE

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from two_sweeps import NOISE, RATE, THETA, motions, sweep
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.effort import Effort
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.learned.forms import forms
-from actuator_glue.diagnosis.table import LINEAR, Row, outweighs, scoped, since, weighed
+from actuator_glue.diagnosis.search.table import LINEAR, Row, outweighs, scoped, since, weighed
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.effects import Scale

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.screening import screen
+from actuator_glue.diagnosis.refits.screening import screen
 from actuator_glue.model.parameters import Parameter
 
 

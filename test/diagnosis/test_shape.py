@@ -5,7 +5,7 @@ import pytest
 from smooth_machines import piston
 from two_sweeps import RATE, motions, selected_of, sweep
 
-from actuator_glue.diagnosis.moves import describe
+from actuator_glue.diagnosis.moves import learned_terms
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.model import commands
 from actuator_glue.records import Record
@@ -47,7 +47,7 @@ def test_friction_that_is_reached_late_has_its_shape(
     machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (kind, FRICTION))) for k in (0.0, 250e3)]
     selection, found = selected_of(names, machine)
     assert found.left < found.material
-    shaped = describe.reshaped(selection, found)
+    shaped = learned_terms.reshaped(selection, found)
     assert shaped is not None
     assert shaped.final.effects == (form,)
     force, reached = shaped.final.fit.theta[4:]
@@ -65,7 +65,7 @@ def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     machine = motions(effects, THETA, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
     selection, found = selected_of(NAMES, machine, 1)
     assert found.final.effects == ('coulomb-friction',)
-    assert describe.reshaped(selection, found) is None
+    assert learned_terms.reshaped(selection, found) is None
 
 
 VALVE = ('valve-deadband', 'coulomb-friction', 'valve-null', 'gain', 'bias')
@@ -79,7 +79,7 @@ def test_a_wrong_name_that_seems_enough_gives_way() -> None:
     machine = [(k, u, piston(u, 1.0 / RATE, MACHINE, k, (6, 25e-6))) for k in (0.0, 250e3)]
     selection, found = selected_of(VALVE, machine)
     assert len(found.final.effects) == 1 and found.left < found.material
-    told = describe.instead(selection, found)
+    told = learned_terms.instead(selection, found)
     assert told is not None
     assert told.final.effects == ('learned-command-play',)
     assert told.final.fit.theta[4] == pytest.approx(25e-6, rel=0.1)
@@ -92,4 +92,4 @@ def test_a_right_name_stays() -> None:
     machine = motions(effects, MACHINE, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
     selection, found = selected_of(VALVE, machine)
     assert found.final.effects == ('valve-deadband',)
-    assert describe.instead(selection, found) is None
+    assert learned_terms.instead(selection, found) is None

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from actuator_glue.diagnosis import false_alarms, ties, verdict
-from actuator_glue.diagnosis.held_out import HeldOutError
-from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.score import false_alarms
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.search import ties
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.verdict import verdict
+from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array, Record
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.hygiene import slow_channel
 from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.model.structure import Structure

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from actuator_glue.diagnosis.simulation_spread import reached
+from actuator_glue.diagnosis.posterior.simulation_spread import reached
 
 
 @pytest.mark.parametrize('size', [0.1, 1.0, 3.0])

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.stretches import stretches
 from actuator_glue.model.structure import Structure

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from trials import entries, trial
 
-from actuator_glue.diagnosis.judge import Judge
+from actuator_glue.diagnosis.score.weights import price
+from actuator_glue.diagnosis.search.judge import Judge
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.diagnosis.weights import price
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure

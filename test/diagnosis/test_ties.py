@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import mixed_draws, posterior, ties
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.identifiable import Working
+from actuator_glue.diagnosis.posterior import mixed_draws, posterior
+from actuator_glue.diagnosis.posterior.identifiable import Working
+from actuator_glue.diagnosis.search import ties
 from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure

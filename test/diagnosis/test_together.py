@@ -3,9 +3,9 @@
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.moves import two_effects
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 

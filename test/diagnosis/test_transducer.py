@@ -5,10 +5,10 @@ import pytest
 from scipy.interpolate import CubicSpline
 from smooth_machines import piston
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.moves.feedback import in_the_loop
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis import held_out_look, record_zero
+from actuator_glue.diagnosis.samples import record_zero
+from actuator_glue.diagnosis.verdict import held_out_look
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.model.parameters import TABLE_2

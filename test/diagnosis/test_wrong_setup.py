@@ -8,10 +8,10 @@ import pytest
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.pipeline import conclude
-from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.table import LINEAR
+from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup, find
+from actuator_glue.diagnosis.search.table import LINEAR
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.wrong_setup import WrongSetup, find
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Hold, Record
 

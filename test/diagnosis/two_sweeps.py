@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data

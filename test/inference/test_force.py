@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.diagnosis.force import with_forces
+from actuator_glue.diagnosis.samples.force import with_forces
 from actuator_glue.errors import InputError
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.space import Space, jacobian

@@ -9,18 +9,18 @@ import pytest
 from matplotlib.figure import Figure
 
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.next_experiment import Experiment
-from actuator_glue.diagnosis.posterior import Draws
-from actuator_glue.diagnosis.response import Response, Sine
-from actuator_glue.diagnosis.result import (
+from actuator_glue.diagnosis.posterior.posterior import Draws
+from actuator_glue.diagnosis.telling.next_experiment import Experiment
+from actuator_glue.diagnosis.telling.response import Response, Sine
+from actuator_glue.diagnosis.telling.result import (
     Alarm,
     Candidate,
     DiagnosisData,
     Estimate,
     Finding,
     HeldOutError,
-    Trace,
 )
+from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report import diagnosis_report
 from actuator_glue.report.diagnosis_report import page as page_of

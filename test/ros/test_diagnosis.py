@@ -11,7 +11,7 @@ from actuator_glue_msgs.msg import Diagnosis
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from actuator_glue.diagnosis.result import SCHEMA
+from actuator_glue.diagnosis.telling.result import SCHEMA
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.model.parameters import NAMES
 from examples.demonstration import pretests

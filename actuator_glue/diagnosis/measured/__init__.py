@@ -1,1 +1,1 @@
-"""Effects of the measurement, which leave no mean response."""
+"""Effects of the measurement, which leave no mean response: hum, grid, jitter."""

@@ -12,7 +12,7 @@ import numpy as np
 from actuator_glue.diagnosis.measured import hum, measurement
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
-from actuator_glue.diagnosis.one_record import OneRecord
+from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
-from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.moves import describe
+from actuator_glue.diagnosis.moves import learned_terms
 from actuator_glue.diagnosis.moves.move import Asking, after
-from actuator_glue.diagnosis.search import FAR
+from actuator_glue.diagnosis.refits.candidates import FAULTS, FEEDBACK
+from actuator_glue.diagnosis.refits.structures import FAR
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
@@ -39,8 +39,8 @@ def _described(result: Conclusion, inside: Selection) -> Conclusion | None:
     if inside.left >= result.selection.material:
         return None
     selection = result.selection.apart()
-    found = describe.learned(selection, result.found)
-    if found is None or not describe.as_good_and_plainer(selection, found, inside):
+    found = learned_terms.learned(selection, result.found)
+    if found is None or not learned_terms.as_good_and_plainer(selection, found, inside):
         return None
     return result.complete(selection, found)
 

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.preparation import Prepared
-from actuator_glue.diagnosis.search_step import SearchStep
-from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.samples.preparation import Prepared
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.search.conclusion import Conclusion
+from actuator_glue.diagnosis.selection import SearchStep, Selection
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 

@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import table
-from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, after, beside, follow
 from actuator_glue.diagnosis.moves.since_onset import since_onset
-from actuator_glue.diagnosis.preparation import Prepared
-from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.weights import price
-from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.samples.preparation import Prepared
+from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.score.weights import price
+from actuator_glue.diagnosis.search import table
+from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.inference.least_squares.fit import Fit, fit
 
 _SINGLES = 3  # best single effects that are refitted with the other hold

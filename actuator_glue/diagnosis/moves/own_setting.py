@@ -12,18 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.one_record import OneRecord
-from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.scopes.one_record import OneRecord
+from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.score.weights import price
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.search.conclusion import Conclusion
+from actuator_glue.diagnosis.search.gains import removed
+from actuator_glue.diagnosis.search.table import Row, row
+from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.table import Row, row
-from actuator_glue.diagnosis.ties import compare
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.diagnosis.weights import price
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.effects import CATALOGUE

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Final
 
 from actuator_glue.diagnosis.moves import (
-    describe,
     feedback,
+    learned_terms,
     other_hold,
     own_setting,
     reserved,
@@ -34,11 +34,13 @@ from actuator_glue.diagnosis.moves.move import (
 WITHIN: Final[Groups] = (
     (
         AnswerMove("one record's own setting", described, own_setting.own_setting),
-        AnswerMove('learned terms', described, describe.with_terms),
+        AnswerMove('learned terms', described, learned_terms.with_terms),
     ),
     (
         AnswerMove('', always, feedback.fed_back),
-        AnswerMove('a description in place of names', complete, describe.plainer, each_time=False),
+        AnswerMove(
+            'a description in place of names', complete, learned_terms.plainer, each_time=False
+        ),
     ),
     (AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),),
     (AnswerMove("one record's own setting", unexplained, own_setting.own_setting),),

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.refits.candidates import mean_effects
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.score.scorer import Scorer
+from actuator_glue.diagnosis.search.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.trial import Trial
 
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, after, follow
-from actuator_glue.diagnosis.onset import moments
-from actuator_glue.diagnosis.onset.moments import Moment
-from actuator_glue.diagnosis.onset.onset import Appeared
+from actuator_glue.diagnosis.scopes import moments
+from actuator_glue.diagnosis.scopes.moments import Moment
+from actuator_glue.diagnosis.scopes.onset import Appeared
+from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.inference.least_squares.fit import Fit
 

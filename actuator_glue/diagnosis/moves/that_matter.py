@@ -6,8 +6,8 @@ remove a material error is an addition like any other.
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis import companions
-from actuator_glue.diagnosis.beam_search import BeamSearch
+from actuator_glue.diagnosis.search import companions
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 
 

@@ -7,11 +7,11 @@ descriptions are worth adding, and reported only where they explain all that is 
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.search import by_score
+from actuator_glue.diagnosis.refits.structures import by_score
+from actuator_glue.diagnosis.score.weights import choices
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.diagnosis.weights import choices
 
 
 def explained(selection: BeamSearch, found: Selection) -> Selection | None:

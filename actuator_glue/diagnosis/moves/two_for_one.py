@@ -4,13 +4,13 @@ For a machine with a slow valve and a clock that runs fast, a drifting gain may 
 passes for noise: each of the true names alone is worse than the wrong one. A significant but
 immaterial effect beside the wrong name is the clue: with it another name may explain the rest,
 with as many parameters and more evidence. Names of more than one parameter have pairs as rivals
-(diagnosis/pairs.py).
+(diagnosis/search/pairs.py).
 """
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
-from actuator_glue.diagnosis.companions import SEEN, beside
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.search.companions import SEEN, beside
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 

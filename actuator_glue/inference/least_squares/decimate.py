@@ -141,7 +141,8 @@ def means(values: Array, count: int) -> Array:
 def decimated(record: Record, count: int) -> Record:
     """Return a record with one sample for `count`, the first at the same time.
 
-    The force is left out; decimated beside it, it is a record of its own (diagnosis/force.py).
+    The force is left out; decimated beside it, it is a record of its own
+    (diagnosis/samples/force.py).
     """
     if count == 1:
         return record

@@ -43,7 +43,7 @@ class Model(Protocol):
 
 @runtime_checkable
 class ObservedChannel(Protocol):
-    """A record that shows something else than the displacement (see diagnosis/force.py)."""
+    """A record that shows something else than the displacement (diagnosis/samples/force.py)."""
 
     def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
         """What its measured channel shows of theta (m, p), (m, n)."""

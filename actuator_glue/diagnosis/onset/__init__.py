@@ -1,1 +1,0 @@
-"""Effects that begin in the middle of a record: when, and how."""

@@ -1,0 +1,1 @@
+"""Draws over all plausible structures, from which every interval is told."""

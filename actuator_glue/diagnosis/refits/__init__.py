@@ -1,0 +1,1 @@
+"""Structures refitted to the fitting part, each once."""

@@ -1,0 +1,424 @@
+"""Refit Eq. (2) with effects added: rough refits of all candidates, then those that matter."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.refits import global_search, poles
+from actuator_glue.diagnosis.refits.screening import screen, signatures
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit, rms
+from actuator_glue.inference.least_squares.scatter import scattered
+from actuator_glue.inference.least_squares.space import Space, sum_of_squares
+from actuator_glue.inference.least_squares.stretches import Part, stretches
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
+from actuator_glue.model.parameters import BASE
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array
+
+_COARSE = 8  # iterations of every refit; promising ones go on
+_TOLERANCE = 1e-4
+# Relative gain of a step below which a promising refit ends. A hundredth of a nat of a structure's
+# weight is 1e-5 of the squared error where that is only noise (weights.py).
+_DONE = 1e-5
+_FINISHED = 2  # iterations on all samples after those on stretches of them
+_PROMISING = 0.95  # of the error: friction that leaves less is searched for globally
+_POLISHED = 4
+FAR = 1.5  # times another's squared error: too far behind to be worth finishing
+_LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a reported structure, and tolerance
+_FINER = 0.1  # of a usual finite-difference step
+_LONG = 5.0  # times their stretches: for longer data these tell which minimum is the lowest
+
+
+def by_score(trial: Trial) -> float:
+    """Sort the best out-of-sample score first."""
+    return -float(trial.scores.sum())
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Refits of a structure that are asked for.
+
+    Attributes:
+        current: the structure.
+        names: further effects, added one at a time.
+        below: mean squared error below which a refit is worth finishing [m^2].
+    """
+
+    current: Trial
+    names: tuple[str, ...]
+    below: float = np.inf
+
+
+def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
+    """Return the trials near the best, best first, and those of far smaller error.
+
+    A fit short of its optimum has a bad score, but is not worth finishing where another is far
+    better.
+    """
+    error = row[0].mean_square if row else 0.0
+    tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < FAR * error]
+    least = sorted(row[_POLISHED:], key=lambda t: t.mean_square)[:2]
+    tried += [t for t in least if FAR * t.mean_square < error]
+    return [t for t in tried if t.mean_square < below]
+
+
+@dataclass
+class Search:
+    """All structures tried on one data set, each refitted once.
+
+    Attributes:
+        data: the counted samples.
+        scorer: noise and blocks; set once the base is fitted.
+        entries: all effects, in the order in which they stand in a structure: those of the
+            catalogue, and learned terms that only this search knows.
+        names: effects that act on the mean response.
+        each: refits candidates, several at a time if it can (the kernels release the
+            interpreter lock).
+        described: whether the entries hold the learned terms.
+        effort: what all refits cost.
+    """
+
+    data: Data
+    names: tuple[str, ...]
+    each: Each = map
+    scorer: Scorer | None = None
+    entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
+    described: bool = False
+    effort: Effort = field(default_factory=Effort)
+    _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
+    _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
+    _polished: dict[frozenset[str], int] = field(default_factory=dict)
+    _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
+
+    def base(self) -> Fit:
+        """Fit Eq. (2)."""
+        if frozenset() not in self._tried:
+            self._tried[frozenset()] = self.effort.spent_on(base_fit(self.data))
+        return self._tried[frozenset()]
+
+    def scale(self) -> Scale:
+        """Sizes of this test at the fitted base."""
+        return scale(self.data.records, self._tried[frozenset()].theta)
+
+    def structure(self, *effects: str) -> Structure:
+        """Return the structure of these effects, in their order."""
+        return Structure(e for name, e in self.entries.items() if name in effects)
+
+    def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
+        """Score an already refitted structure with the current noise."""
+        assert self.scorer is not None
+        found = self._tried[frozenset(effects)]
+        return Trial(self.structure(*effects), added, found, self.scorer.block_scores(found))
+
+    def with_misfit(self, trial: Trial) -> Scorer:
+        """Return a scorer that counts all that a structure leaves as noise."""
+        if trial.fit not in self._misfit:
+            parts = splits_of(self.data, trial.fit.error)
+            self._misfit[trial.fit] = Scorer.of(self.data, parts, misfit=True)
+        return self._misfit[trial.fit]
+
+    def known(self, effects: Iterable[str]) -> Trial | None:
+        """Return a structure that was refitted, or None."""
+        names = tuple(effects)
+        return self.trial(names) if frozenset(names) in self._tried else None
+
+    def others(self, trial: Trial) -> list[str]:
+        """Return the names that a structure does not have."""
+        return [n for n in self.names if n not in trial.effects]
+
+    def terms(self) -> list[str]:
+        """Return the learned terms for this test; the entries hold them from the first call on."""
+        if not self.described:
+            self.entries |= {e.name: e for e in forms(self.scale(), self.entries)}
+            self.described = True
+        return [n for n, e in self.entries.items() if is_learned(e) and n not in self.names]
+
+    def wider(self, names: Sequence[str]) -> Search:
+        """Return a search that tries further effects; it knows all structures refitted so far."""
+        own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
+        return replace(self, names=(*self.names, *names), **own)
+
+    def take_over(
+        self, other: Search, final: Trial, singles: Sequence[Trial], matters: float
+    ) -> None:
+        """Refit structures of another search of nearly the same target, from where they ended.
+
+        Args:
+            other: the search; its names and learned terms are taken over.
+            final: its result; structures that leave no materially larger error, or have one
+                effect less, are refitted, too.
+            singles: every single effect; those that leave more are taken as they are.
+            matters: least rms error that matters [m].
+        """
+        self.names, self.entries = other.names, dict(other.entries)
+        self.described = other.described
+        most = final.mean_square + matters**2
+        near = {key for key, known in other._tried.items() if known.rms**2 < most}
+        near |= {frozenset(final.effects) - {n} for n in final.effects} & other._tried.keys()
+        far = {frozenset(t.effects) for t in singles} - near
+        self._polished |= {key: other._polished[key] for key in near & other._polished.keys()}
+
+        def again(key: frozenset[str]) -> Fit:
+            start, steps = other._tried[key].theta, 0 if key in far else _COARSE
+            return self._fit(self.data, self.structure(*key), start, iterations=steps)
+
+        asked = sorted(near | far, key=sorted)
+        for key, found in zip(asked, self.each(again, asked), strict=True):
+            if key not in self._tried or found.rms < self._tried[key].rms:
+                self._keep(key, found)
+
+    def left_at_most(self, mean_square: float) -> list[tuple[Structure, Fit]]:
+        """Return all refitted structures that leave no more than a mean squared error [m^2]."""
+        found = [(key, fit) for key, fit in self._tried.items() if fit.rms**2 <= mean_square]
+        return [(self.structure(*effects), fit) for effects, fit in found]
+
+    def add(self, current: Trial, name: str, each: Each = map) -> Trial:
+        """Refit `current` with one more effect; pass `each` where nothing else runs meanwhile."""
+        model = self.structure(*current.effects, name)
+        key = frozenset(model.effects)
+        near = self.effort.earlier.ended.get(key)
+        if key not in self._tried and near is not None:
+            starts = np.stack([near, self.screen(current, name)[1][0]])
+            start = self._lowest(starts, model.effects)
+            found = self._fit(self.data, model, start, iterations=_COARSE, tolerance=_TOLERANCE)
+            self._keep(key, found)
+        elif key not in self._tried:
+            starts, part = self.screen(current, name)[1], self._stand_in(model)
+            found = self._fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
+            friction = not current.effects and self.entries[name].group == 'friction'
+            if friction and found.rms < _PROMISING * rms(current.fit.error[part.rows]):
+                found = self.effort.spent_on(
+                    global_search.refit(part.data, model, found, _COARSE, _TOLERANCE, each)
+                )
+            if part is not self._whole:
+                found = self._fit(
+                    self.data, model, found.theta, iterations=_FINISHED, tolerance=_TOLERANCE
+                )
+            self._keep(key, found)
+        return self.trial(model.effects, name)
+
+    def polish(self, trial: Trial, valves: bool = True) -> Trial:
+        """Finish the refit of a promising trial, from slower or quicker valves if need be."""
+        key, added = frozenset(trial.effects), self.entries[trial.added]
+        wanted = 2 if valves and poles.may_change(added) else 1
+        if self._polished.get(key, 0) < wanted:
+            some = self._stand_in(trial.structure).data
+            data = some if _LONG * some.target.size < self.data.target.size else self.data
+            before = self._tried[key].theta
+            start = global_search.along_ridge(data, trial.structure, before)
+            if wanted > 1:
+                stiffness = frozenset(r.known_stiffness() for r in data.records)
+                start = poles.starts(trial.structure, added, start, stiffness)
+            if data is not self.data:
+                start = np.stack([self._fit(data, trial.structure, start).theta, before])
+            self._keep(key, self._fit(self.data, trial.structure, start))
+            self._polished[key] = wanted
+        return self.trial(trial.effects, trial.added)
+
+    def finished(self, trial: Trial, finely: bool = False) -> Trial:
+        """Go on with a refit until it gains nothing: a pole near a zero converges slowly.
+
+        Where something remains (`finely`), also with small difference steps and from points around
+        it: across the close kinks of stick-slip friction, usual differences do not point downhill.
+        """
+        key, model = frozenset(trial.effects), trial.structure
+        last: dict[str, Any] = {'iterations': _LAST, 'tolerance': _LEAST_GAIN}
+        found = self._fit(self.data, model, trial.fit.theta, **last)
+        if finely:
+            space = Space(model, self.data.duration, _FINER)
+            lower = self._fit(self.data, model, found.theta, space=space, **last)
+            if lower.rms < found.rms:
+                found = self._fit(self.data, model, lower.theta, iterations=_FINISHED)
+            found = self.effort.spent_on(scattered(self.data, model, found, _DONE))
+        self._keep(key, found)
+        return self.trial(trial.effects, trial.added)
+
+    def _keep(self, key: frozenset[str], found: Fit) -> None:
+        """Note a refitted structure; a learned term's name means nothing to a later diagnosis."""
+        self._tried[key] = found
+        # On the kinks of friction a refit may end anywhere: a later diagnosis searches it anew.
+        if all(n in CATALOGUE and CATALOGUE[n].group != 'friction' for n in key):
+            self.effort.remembered.ended[key] = found.theta
+
+    def _fit(self, data: Data, model: Structure, starts: Array, **how: Any) -> Fit:
+        return self.effort.spent_on(fit(data, model, starts, **{'tolerance': _DONE, **how}))
+
+    def _lowest(self, starts: Array, effects: Sequence[str]) -> Array:
+        """Return the parameters (p,) of some (s, p) that leave the least error."""
+        simulated = self.data.simulate(self.structure(*effects), starts)
+        return np.asarray(starts[np.argmin(sum_of_squares(self.data.target - simulated))])
+
+    def _stand_in(self, model: Structure) -> Part:
+        """Return the data that structures are refitted to roughly."""
+        return self._whole if any(e.record_time for e in model.entries) else self._stretches
+
+    @cached_property
+    def _whole(self) -> Part:
+        return Part(self.data, slice(None), tuple(range(len(self.data.records))))
+
+    @cached_property
+    def _stretches(self) -> Part:
+        return stretches(self.data) or self._whole
+
+    def _signature(self, name: str, part: Part) -> tuple[Array, Array]:
+        """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, M)."""
+        if name not in self._signatures:
+            alone, base = self.structure(name), self._tried[frozenset()].theta
+            thetas = alone.starts(base, self.scale())
+            seen = signatures(part.data, alone, thetas, base)
+            self._signatures[name] = thetas[:, alone.columns(name)], seen
+        return self._signatures[name]
+
+    def signature(self, name: str) -> tuple[Array, Array]:
+        """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
+        return self._signature(name, self._stand_in(self.structure(name)))
+
+    def signatures(self) -> tuple[Array, Array, Scorer]:
+        """Every effect's signatures at all its starting sizes (s, M) [m].
+
+        And what they are seen against: the Jacobian of Eq. (2) (4, M), and the noise.
+        """
+        assert self.scorer is not None
+        part, rows = self._stretches, []
+        for name in self.names:
+            own, seen = self._stand_in(self.structure(name)), self.signature(name)[1]
+            rows.append(seen if own is part else seen[:, part.rows])
+        every = np.concatenate(rows)
+        jacobian = self._tried[frozenset()].jacobian_of(part.rows)
+        # A metre of response: it diverged.
+        alive = np.nan_to_num(np.abs(every), nan=np.inf).max(axis=1) < 1.0
+        return every[alive], jacobian, self.scorer.of_part(part)
+
+    def screen(self, current: Trial, name: str, *, beside: bool = False) -> tuple[float, Array]:
+        """Project the residual on an effect's signatures (see diagnosis/refits/screening.py).
+
+        They are those with Eq. (2) alone, or `beside` the effects of the present structure.
+
+        Returns:
+            The largest share of the squared error that one of the effect's starting sizes can
+            remove, and the starting parameters that promise most (s, p).
+        """
+        model = self.structure(*current.effects, name)
+        part, fit = self._stand_in(self.structure(name)), current.fit
+        sizes, seen = self._signature(name, part)
+        new = np.zeros(len(model.parameters), dtype=np.bool_)
+        new[model.columns(name)] = True
+
+        def with_others(own: Array) -> Array:
+            thetas = np.empty((len(own), len(new)))
+            thetas[:, new], thetas[:, ~new] = own, fit.theta
+            return thetas
+
+        error = fit.error[part.rows]
+        if beside:
+            seen = part.data.simulate(model, with_others(sizes)) - (part.data.target - error)
+        parameters, jacobian = self.entries[name].parameters, fit.jacobian_of(part.rows)
+        share, best = screen(parameters, sizes, seen, error, jacobian)
+        return share, with_others(best)
+
+    def additions(
+        self,
+        current: Trial,
+        names: Iterable[str] | None = None,
+        progress: Callable[[float], None] = lambda share: None,
+        *,
+        valves: bool = True,
+        below: float = np.inf,
+    ) -> list[Trial]:
+        """Refit `current` with every further effect, best out-of-sample score first.
+
+        Those near the best are finished, from a slower and a quicker valve too if need be, where
+        they leave a mean squared error of less than `below` [m^2].
+        """
+        asked = Asked(current, tuple(names or self.names), below)
+        return self.additions_to([asked], progress, valves=valves)[0]
+
+    def additions_to(
+        self,
+        asked: Sequence[Asked],
+        progress: Callable[[float], None] = lambda share: None,
+        *,
+        valves: bool = True,
+        together: bool = False,
+    ) -> list[list[Trial]]:
+        """Refit several structures as `additions` does, all of their refits at the same time.
+
+        Those near the best of their row, or of all rows `together`, are finished.
+        """
+        wanted = [[(a.current, n) for n in a.names if n not in a.current.effects] for a in asked]
+        # Two structures may lead to the same one: it is refitted from the first.
+        first: dict[frozenset[str], tuple[Trial, str]] = {}
+        for current, name in itertools.chain(*wanted):
+            first.setdefault(frozenset((*current.effects, name)), (current, name))
+        for i, _ in enumerate(self.each(lambda pair: self.add(*pair), first.values())):
+            progress((i + 1) / len(first))
+        rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
+        if together:
+            every = {frozenset(t.effects): t for t in itertools.chain(*rows)}
+            best = sorted(every.values(), key=by_score)
+            worth = [_worth_finishing(best, max((a.below for a in asked), default=np.inf))]
+        else:
+            worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
+        last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
+        polished = self.each(lambda trial: self.polish(trial, valves), last.values())
+        done = dict(zip(last, polished, strict=True))
+        known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
+        return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
+
+    def promised(
+        self, current: Trial, names: Iterable[str], *, beside: bool = False
+    ) -> list[tuple[str, float]]:
+        """Sort effects by the mean squared error that their signatures promise to leave [m^2].
+
+        Those with Eq. (2) alone, or `beside` the present effects, which takes as long as refits.
+        """
+        wanted = list(names)
+        shares = list(self.each(lambda n: self.screen(current, n, beside=beside)[0], wanted))
+        left = [(n, (1.0 - s) * current.mean_square) for n, s in zip(wanted, shares, strict=True)]
+        return sorted(left, key=lambda pair: pair[1])
+
+    def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
+        """Sort effects by what their signatures promise, as `promised`."""
+        return [name for name, _ in self.promised(current, names, beside=beside)]
+
+    def without_each(self, current: Trial) -> list[Trial]:
+        """Refit a structure with each of its effects taken away, in their order, as `without`."""
+        return list(self.each(lambda name: self.without(current, name), current.effects))
+
+    def without(self, current: Trial, name: str) -> Trial:
+        """Refit a structure with one effect taken away, from where the larger one stands.
+
+        A smaller structure that was fitted before may have stopped in a worse minimum than the
+        larger one leads to: the effect would then be credited with what only the start gained.
+        """
+        effects = tuple(n for n in current.effects if n != name)
+        key = frozenset(effects)
+        if (key, current.effects) not in self._descended:
+            self._descended.add((key, current.effects))
+            kept = np.delete(current.fit.theta, current.structure.columns(name))
+            starts = np.tile(kept, (2, 1))
+            starts[1, : len(BASE)] = self._tried[frozenset()].theta
+            model, start = self.structure(*effects), self._lowest(starts, effects)
+            again = self._fit(self.data, model, start, tolerance=_TOLERANCE)
+            if again.rms**2 < FAR * current.mean_square:
+                again = self._fit(self.data, model, again.theta)
+            if key not in self._tried or again.rms < self._tried[key].rms:
+                self._tried[key] = again
+            self._polished.setdefault(key, 1)
+        return self.trial(effects)

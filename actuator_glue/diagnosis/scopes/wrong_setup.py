@@ -1,0 +1,169 @@
+"""Whether records were made under another set-up than was given with them.
+
+Stiffnesses that were given to the wrong records, or the wrong hold of the command between its
+samples, look like a machine that is far from Eq. (2). Where Eq. (2) explains far more under
+another set-up, that is said before anything else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit, base_fit
+from actuator_glue.inference.least_squares.stretches import stretches
+from actuator_glue.json_value import JsonObject
+from actuator_glue.model.effects import scale
+from actuator_glue.records import Hold, source_name
+
+_FAR = 2.0  # times the other set-up's mean square: more than half of the error is the set-up's
+_RUNS = {
+    'linear': 'running linearly between its samples (--hold linear)',
+    'zoh': 'held between its samples (--hold zoh)',
+}
+_MOST = 6  # with up to so many records, any two may have been exchanged
+
+
+@dataclass(frozen=True, slots=True)
+class WrongSetup(JsonObject):
+    """Another set-up under which Eq. (2) explains the records far better.
+
+    Attributes:
+        sources: names of the records.
+        stiffness: the specimen stiffness of each record under it [N/m].
+        hold: how the command of each record runs between its samples under it.
+        changed: what is not as given: 'stiffness', 'hold' or both.
+        error: rms error of Eq. (2) refitted under it [m].
+        as_given: rms error of Eq. (2) refitted under the set-up that was given [m].
+        enough: whether Eq. (2) alone leaves nothing under it that matters.
+        taken: whether the diagnosis is one under it; else it is one as given.
+    """
+
+    sources: tuple[str, ...]
+    stiffness: tuple[float, ...]
+    hold: tuple[Hold, ...]
+    changed: tuple[str, ...]
+    error: float
+    as_given: float
+    enough: bool
+    taken: bool = False
+
+    @classmethod
+    def between(
+        cls,
+        given: Data,
+        other: Data,
+        errors: tuple[float, float],
+        enough: bool,
+        taken: bool = False,
+    ) -> WrongSetup:
+        """Return what differs between the set-up of some data and another one of the same.
+
+        Args:
+            given: the data as given.
+            other: the same data under the other set-up.
+            errors: rms errors of Eq. (2), refitted as given and under the other one [m].
+            enough: as the attribute.
+            taken: as the attribute.
+        """
+        was, now = given.recorded, other.recorded
+        changed = {
+            'stiffness': any(a.stiffness != b.stiffness for a, b in zip(was, now, strict=True)),
+            'hold': any(a.hold != b.hold for a, b in zip(was, now, strict=True)),
+        }
+        return cls(
+            sources=tuple(r.source or f'record {i + 1}' for i, r in enumerate(was)),
+            stiffness=tuple(r.known_stiffness() for r in now),
+            hold=tuple(r.hold for r in now),
+            changed=tuple(name for name, is_other in changed.items() if is_other),
+            error=errors[1],
+            as_given=errors[0],
+            enough=enough,
+            taken=taken,
+        )
+
+    @property
+    def runs_linearly(self) -> bool:
+        """Whether it differs in one thing: the command runs linearly and was given as held."""
+        return self.changed == ('hold',) and 'linear' in self.hold
+
+    def sentence(self) -> str:
+        """Say what to check, or what was taken instead."""
+        parts = []
+        if 'stiffness' in self.changed:
+            pairs = zip(self.sources, self.stiffness, strict=True)
+            order = ', '.join(f'{k:g} N/m for {source_name(s)}' for s, k in pairs)
+            parts.append(f'specimen stiffnesses exchanged ({order})')
+        if 'hold' in self.changed:
+            parts.append(f'the command {_RUNS["linear" if "linear" in self.hold else "zoh"]}')
+        alone = (
+            f'Eq. (2) alone leaves {1e6 * self.error:.1f} um '
+            f'instead of {1e6 * self.as_given:.1f} um'
+        )
+        if self.taken:
+            return f'not as given but with {" and ".join(parts)}, where {alone}'
+        return f'check the set-ups: with {" and ".join(parts)} {alone}'
+
+
+def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSetup | None:
+    """Return a set-up that explains records far better than the one given; None for none.
+
+    Args:
+        data: the fitting part.
+        settings: thresholds.
+        given: Eq. (2) fitted to `stretched(data)`, where that is known.
+    """
+    some = stretched(data)
+    given = given or base_fit(some)
+    stroke = scale(some.records, given.theta).stroke
+    left, noise = pooled(some, splits_of(some, given.error))
+    if left < settings.material(noise, stroke):
+        return None
+    others = list(_others(data))
+    parts = [stretched(other) for other in others]
+    fits = [base_fit(part) for part in parts]
+    best = min(range(len(fits)), key=lambda i: fits[i].rms)
+    fit = fits[best]
+    left, noise = pooled(parts[best], splits_of(parts[best], fit.error))
+    material = settings.material(noise, stroke)
+    if given.rms**2 - fit.rms**2 < max(material**2, (_FAR - 1.0) * fit.rms**2):
+        return None
+    if _nats(parts[best], fit, given) < settings.nats + math.log(len(others)):
+        return None
+    return WrongSetup.between(data, others[best], (given.rms, fit.rms), left < material)
+
+
+def stretched(data: Data) -> Data:
+    """Return stretches that stand for long records; short ones as they are."""
+    part = stretches(data)
+    return part.data if part else data
+
+
+def _nats(data: Data, better: Fit, given: Fit) -> float:
+    scorer = Scorer.of(data, splits_of(data, better.error))
+    return evidence(scorer.block_scores(better), scorer.block_scores(given))
+
+
+def _others(data: Data) -> Iterator[Data]:
+    """Yield the data with stiffnesses exchanged, with the other hold, and with both."""
+    known = [r.known_stiffness() for r in data.records]
+    values = sorted(set(known))
+    orders = [
+        [b if k == a else a if k == b else k for k in known] for a, b in combinations(values, 2)
+    ]
+    if len(known) <= _MOST:
+        for i, j in combinations(range(len(known)), 2):
+            order = list(known)
+            order[i], order[j] = order[j], order[i]
+            if order != known and order not in orders:
+                orders.append(order)
+    exchanged = [data.with_setup(stiffness=order) for order in orders]
+    yield from exchanged
+    linear = any(r.hold == 'linear' for r in data.recorded)
+    for one in (*exchanged, data):
+        yield one.with_setup(hold='zoh' if linear else 'linear')

@@ -1,0 +1,1 @@
+"""How well a structure explains the samples: block scores, noise, the weight of a structure."""

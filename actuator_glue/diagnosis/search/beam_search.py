@@ -1,0 +1,360 @@
+"""Name the missing effects: beam search over sets of effects, alternatives of each member."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from functools import partial
+
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.refits.structures import Asked, Search, by_score
+from actuator_glue.diagnosis.score import false_alarms
+from actuator_glue.diagnosis.search import gains, pairs
+from actuator_glue.diagnosis.search.gains import removed, worth
+from actuator_glue.diagnosis.search.judge import Judge
+from actuator_glue.diagnosis.search.ties import compare
+from actuator_glue.diagnosis.selection import SearchStep, Selection
+from actuator_glue.diagnosis.stages import EFFECTS, Progress
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
+
+# Rounds in which members may be swapped for better or simpler ones.
+_SWAPS = 4
+# Rounds and swaps where something material remains: fewer, as learned terms may help instead.
+_OPEN, _OPEN_TRIED = 1, 3
+# Names after which learned terms are tried: they may be plainer than further names.
+_NAMES = 2
+MOST_TERMS = 2
+# Squared error that signatures promise over that of a refit, at most: three at the most of some
+# hundred terms.
+_REFITTED = 4.0
+
+
+class BeamSearch(Judge):
+    """Beam search over effect sets on one data set.
+
+    Args:
+        search: the structures.
+        settings: thresholds.
+        progress: takes progress.
+    """
+
+    def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
+        super().__init__(search, settings)
+        self.progress = progress
+
+    def apart(self) -> BeamSearch:
+        """Return an independent copy: its additions and its noise do not change this search."""
+        other = copy(self)
+        other.search = replace(self.search.wider(()), entries=dict(self.search.entries))
+        return other
+
+    def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
+        """Refit every structure of the beam with its most promising further effects.
+
+        Beyond `_NAMES` of them with learned terms, too: for what is outside the catalogue, further
+        names would only imitate it.
+        """
+        label = EFFECTS[min(stage, len(EFFECTS)) - 1]
+        self.progress(label, 0.0)
+        asked = []
+        for current in beam:
+            names = self.search.screened(current, self.search.others(current))
+            names = names[: self.settings.tried]
+            if stage > _NAMES:
+                names += self._promising_terms(current)
+            asked.append(Asked(current, tuple(names)))
+        found: dict[tuple[str, ...], Trial] = {}
+        told = partial(self.progress, label)
+        for row in self.search.additions_to(asked, told, valves=False, together=True):
+            for trial in row:
+                found.setdefault(trial.effects, trial)
+        return sorted(found.values(), key=by_score)
+
+    def with_terms(self, starts: Sequence[Trial], below: float = math.inf) -> list[list[Trial]]:
+        """Refit structures with the learned terms that promise most beside each.
+
+        Args:
+            starts: the structures.
+            below: mean squared error that is of use [m^2]; terms whose signatures promise far
+                more are not refitted.
+        """
+        asked = [Asked(s, tuple(self._promising_terms(s, below)), below) for s in starts]
+        return self.search.additions_to(asked)
+
+    def explained_by_term(self, current: Trial) -> bool:
+        """Whether a learned term leaves nothing material, alone or added to the names found.
+
+        Tried before many names are added: for a machine outside the catalogue, further names would
+        cost the time that a description needs.
+        """
+        rows = self.with_terms((self.search.trial(()), current))
+        return any(self.left(trial) < self.material for trial in itertools.chain(*rows))
+
+    def _promising_terms(self, current: Trial, below: float = math.inf) -> list[str]:
+        if sum(map(is_learned, current.structure.entries)) >= MOST_TERMS:
+            return []
+        names = [n for n in self.search.terms() if n not in current.effects]
+        promised = self.search.promised(current, names)
+        most = _REFITTED * below
+        return [n for n, left in promised if left < most][: self.settings.terms]
+
+    def overlooked(self, current: Trial) -> list[Trial]:
+        """Refit a structure with effects that only show once its members are in the model.
+
+        With a clock's skew in it a payload looks like one; with Eq. (2) alone, like the skew.
+        """
+        here, names = current.effects, self.search.others(current)
+        new = [n for n in names if self.search.known((*here, n)) is None]
+        return self._rough(current, self.promising(current, new))
+
+    def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
+        """Return the effects that promise most beside the present ones."""
+        return self.search.screened(current, names, beside=True)[: self.settings.tried]
+
+    def next_worth(self, current: Trial) -> Trial | None:
+        """Return the structure with one more promising name that is worth it; None if none is."""
+        names = self.promising(current, self.search.others(current))
+        return self._first_worth(self._rough(current, names), current, self.material)
+
+    def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
+        """Refit a structure roughly with each further effect; finish those that may matter."""
+        below = self.may_matter_below(current)
+        return self.search.additions(current, names, valves=False, below=below)
+
+    def run(self) -> Selection:
+        """Add effects while each is worth it, then check each against its rivals."""
+        self.renoise()
+        base = self.search.trial(())
+        singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
+        self.renoise(self._nearest(singles))
+        base, singles = self.search.trial(()), self.rescored(singles)
+        self._set_nats()
+        return self._grown(base, singles, singles, (SearchStep.to(base, 'Eq. (2) alone'),))
+
+    def resumed(self, before: Search, found: Selection) -> Selection:
+        """Continue from the result of another search of the same samples, since cleaned again.
+
+        Its structures are refitted from where they ended, so only changes cost effort; once the
+        effort is spent, its answer still stands.
+
+        Args:
+            before: the other search.
+            found: its result.
+        """
+        own = found.final.added if found.final.own is not None else ''
+        common = before.trial(tuple(n for n in found.final.effects if n != own))
+        self.renoise()
+        self.search.take_over(before, common, found.singles, found.material)
+        current = self._at_its_optimum(self.search.trial(common.effects))
+        self._set_nats()
+        return self._grown(current, self.rescored(found.singles), (), ())
+
+    def _set_nats(self) -> None:
+        found = self.search.signatures()
+        self.nats = false_alarms.threshold(*found, self.settings.false_alarms)
+
+    def _grown(
+        self,
+        current: Trial,
+        singles: Sequence[Trial],
+        ranked: Sequence[Trial],
+        begun: tuple[SearchStep, ...],
+    ) -> Selection:
+        """Add effects to a structure while each is worth it, then hold each against its rivals.
+
+        Args:
+            current: the structure.
+            singles: every single effect.
+            ranked: structures with one more effect, best first; empty tries promising ones.
+            begun: steps that led here; empty when another search is continued.
+        """
+        s, steps, described = self.settings, list(begun), False
+        current, threshold = self.search.trial(current.effects, current.added), self.material
+        base, singles = self.search.trial(()), list(singles)
+        for stage in range(len(current.effects) + 1, s.most + 1):
+            best = self._first_worth(ranked, current, threshold)
+            open_ = self.left(current) >= self.material and not self.search.effort.over
+            if best is None and open_:
+                ranked = self.overlooked(current)
+                best = self._first_worth(ranked, current, threshold)
+            if best is None:
+                # No further name is worth it; a learned term was not tried yet with so few names.
+                asked = open_ and len(current.effects) < _NAMES
+                described = asked and self.explained_by_term(current)
+                break
+            current = self._at_its_optimum(best)
+            steps.append(SearchStep.to(current, f'with {best.added}'))
+            base, singles = self.search.trial(()), self.rescored(singles)
+            threshold = self.material
+            if self.left(current) < max(threshold, s.left_share * self.first):
+                # Most is explained: a small gain may only correct the form of an effect found.
+                threshold = max(threshold, s.later_share * removed(base, current))
+            if self.left(current) < self.material or stage == s.most or self.search.effort.over:
+                break
+            if stage == _NAMES and (described := self.explained_by_term(current)):
+                break
+            width = max(1, s.beam + 1 - stage)  # the more effects, the fewer alternatives
+            ranked = self.extend(self.rescored(ranked[:width]), stage + 1)
+            if ranked and self.left(current) >= self.material:
+                self.renoise(self._nearest(ranked))
+                ranked = self.rescored(ranked)
+            current = self.search.trial(current.effects, current.added)
+        # The result of another search was already compared with its rivals there.
+        spared = described or (not begun and self.search.effort.over)
+        found = self.checked(current, base, singles, exchanged=not spared)
+        if set(found.final.effects) != set(current.effects):
+            steps.append(
+                SearchStep.to(found.final, 'each held against its absence and its rivals')
+            )
+        return replace(found, steps=tuple(steps), described=described)
+
+    def _first_worth(
+        self, ranked: Sequence[Trial], current: Trial, threshold: float
+    ) -> Trial | None:
+        """Return the best structure that is worth its parameters.
+
+        Nats weigh the whitened error, materiality the plain one: the best by nats may be
+        immaterial where another effect is material. A structure that leaves nothing material
+        does more than correct a form, so it must only be material.
+        """
+        whole = (self.left(t) < self.material for t in ranked)
+        asked = zip(ranked, (self.material if w else threshold for w in whole), strict=True)
+        return next((t for t, m in asked if self.better(t, current, m, self._choice(t))), None)
+
+    def _choice(self, trial: Trial) -> float:
+        """Nats that the choice of a learned term costs; the level covers that of a name."""
+        added = self.search.entries[trial.added]
+        return math.log(len(self.search.terms())) if is_learned(added) else 0.0
+
+    def _at_its_optimum(self, current: Trial) -> Trial:
+        """Take the noise from a structure, fully refitted: a rough fit's error is no effect."""
+        self.renoise(current)
+        if self.left(current) >= self.material:
+            current = self.search.finished(current, finely=True)
+            self.renoise(current)
+        return current
+
+    def _nearest(self, trials: Sequence[Trial]) -> Trial:
+        """Return the structure of least left-out error: its residual is nearest to noise.
+
+        Nats weigh the few frequencies with little noise: by them a structure that explains nearly
+        everything may be last.
+        """
+        scorer = self.search.scorer
+        assert scorer is not None
+        return min(trials, key=lambda t: scorer.left_out_error(t.fit))
+
+    def checked(
+        self, current: Trial, base: Trial, singles: Sequence[Trial], *, exchanged: bool = True
+    ) -> Selection:
+        """Compare each member with its absence and its rivals, and note its evidence.
+
+        Args:
+            current: the structure.
+            base: Eq. (2).
+            singles: every single effect.
+            exchanged: whether rivals are refitted, and take a member's place where they are
+                better; else only rivals known already are reported.
+        """
+        current = self.pruned(current)
+        if exchanged:
+            for name in current.effects:
+                current = self.search.polish(replace(current, added=name))
+            rest = self.left(current) >= self.settings.beaten_noise * self.noise
+            current, rivals = self.settle(self.search.finished(current, finely=rest))
+        else:
+            rivals = self._known_rivals(current)
+        taken, nats = worth(self.search, current)
+        return Selection(
+            base, tuple(singles), current, rivals, taken, nats,
+            self.first, self.left(current), self.noise, self.material, self.nats,
+        )  # fmt: skip
+
+    def pruned(self, current: Trial) -> Trial:
+        """Remove members that are not worth their parameters."""
+        for rest in self.search.without_each(current) if len(current.effects) > 1 else ():
+            if not self.better(current, rest, self.least(current, rest)):
+                return self.pruned(rest)
+        return current
+
+    def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
+        """Exchange one member at a time for a rival of more weight, until none has more.
+
+        Returns:
+            The structure, and the rivals of each of its members; where the rounds end with an
+            exchange, only the known ones.
+        """
+        complete = self.left(current) < self.material
+        most = self.settings.tried if complete else _OPEN_TRIED
+        for _ in range(_SWAPS if complete else _OPEN):
+            rests = self.search.without_each(current)
+            in_place = self._in_place(current, rests, most, complete)
+            best = current
+            for trial in itertools.chain(*in_place):
+                if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
+                    best = trial
+            if best is current:
+                return current, self._all_rivals(current, rests, in_place)
+            # With the new member, others may no longer be worth their parameters.
+            current = self.pruned(best)
+            if self.search.effort.over:
+                break
+        return current, self._known_rivals(current)
+
+    def _known_rivals(self, current: Trial) -> dict[str, tuple[Rival, ...]]:
+        rests = self.search.without_each(current)
+        known = [self._known_in_place(current, rest) for rest in rests]
+        return self._all_rivals(current, rests, known)
+
+    def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
+        """Return the known refits with another effect in place of a member."""
+        tried = [(n, self.search.known((*rest.effects, n))) for n in self.search.others(current)]
+        return [replace(trial, added=name) for name, trial in tried if trial is not None]
+
+    def _all_rivals(
+        self, current: Trial, rests: Sequence[Trial], in_place: Sequence[Sequence[Trial]]
+    ) -> dict[str, tuple[Rival, ...]]:
+        rows = zip(current.effects, rests, in_place, strict=True)
+        return {name: self._rivals(rest, current, name, trials) for name, rest, trials in rows}
+
+    def _in_place(
+        self, current: Trial, rests: Sequence[Trial], most: int, complete: bool
+    ) -> list[list[Trial]]:
+        """Refit with the most promising effects, or pairs, in place of each member.
+
+        Args:
+            current: the structure.
+            rests: the structure without each of its members.
+            most: effects tried in place of each of several members.
+            complete: whether nothing material is left.
+        """
+        search, asked = self.search, []
+        for rest in rests:
+            names = search.others(current)
+            if len(current.effects) > 1:
+                names = search.screened(rest, names)[:most]
+            below = gains.left_by_rivals(rest, current)
+            asked.append(Asked(rest, tuple(names), below))
+        singles = search.additions_to(asked)
+        return [
+            [*trials, *pairs.rivals(search, name, trials, most, a.below, complete)]
+            for name, trials, a in zip(current.effects, singles, asked, strict=True)
+        ]
+
+    def _rivals(
+        self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
+    ) -> tuple[Rival, ...]:
+        """Return the rivals with their probabilities; remaining misfit counts as noise."""
+        odds, scorer = self.odds(rest, best, trials), self.search.scorer
+        assert scorer is not None
+        if self.left(best) >= self.material:
+            scorer = self.search.with_misfit(best)
+            rest, best, *trials = (
+                replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
+            )
+        return compare(rest, replace(best, added=name), trials, odds, scorer, self.settings)

@@ -1,0 +1,192 @@
+"""The conclusion from the fitting part of the records, with everything it rests on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.measured import at_recorded_rate
+from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.measured.measurement import Measured
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.samples.preparation import Prepared
+from actuator_glue.diagnosis.scopes.one_record import OneRecord
+from actuator_glue.diagnosis.scopes.onset import Appeared, Onset, dated
+from actuator_glue.diagnosis.score import regression
+from actuator_glue.diagnosis.score.regression import Surrogate
+from actuator_glue.diagnosis.score.scorer import Scorer
+from actuator_glue.diagnosis.search import force_ranking, table
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.search.fitting_verdict import Decision, decide
+from actuator_glue.diagnosis.search.gains import removed
+from actuator_glue.diagnosis.search.table import LINEAR, Row
+from actuator_glue.diagnosis.selection import SearchStep, Selection
+from actuator_glue.diagnosis.stages import Progress
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import Data
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The conclusion from the fitting part of the records.
+
+    Attributes:
+        prepared: the records, fitting part and held-out part.
+        data: the fitting part without hum.
+        scorer: noise and blocks of the final structure.
+        line: hum.
+        found: effects with a mean response.
+        seen: measurement effects.
+        generic: a generic regression to compare them with.
+        decision: the verdict.
+        selection: the search that chose `found`, to continue from.
+        history: the steps that led here.
+        appeared: the onset, where this conclusion holds for the data since then only.
+        others: rows of the searches that it replaced, or was compared with.
+    """
+
+    prepared: Prepared
+    data: Data
+    scorer: Scorer
+    line: Line | None
+    found: Selection
+    seen: tuple[Measured, ...]
+    generic: Surrogate
+    decision: Decision
+    selection: BeamSearch
+    history: tuple[SearchStep, ...]
+    appeared: Appeared | None = None
+    others: tuple[Row, ...] = ()
+
+    @property
+    def scope(self) -> str:
+        """Scope of the reported structure; empty for all records as they were given."""
+        own = self.decision.final.own
+        scopes = (
+            LINEAR if self.prepared.setup is not None else '',
+            self.appeared.scope if self.appeared is not None else '',
+            own.scope if isinstance(own, OneRecord) else '',
+        )
+        return ', '.join(filter(None, scopes))
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return every structure that was refitted on the way here, without weights."""
+        own = table.rows(self.selection.search, self.scorer)
+        return (*self.in_scope(own), *self.others)
+
+    @cached_property
+    def told(self) -> Row:
+        """The row of the reported structure; hum counts as a part of its error."""
+        key = self.scope, frozenset(self.decision.final.effects)
+        found = min((r for r in self.rows() if r.key == key), key=lambda r: r.left_out)
+        line = self.line.rms if self.line is not None else 0.0
+        return replace(found, left_out=math.hypot(found.left_out, line))
+
+    def outweighs(self, other: Conclusion) -> bool:
+        """Whether it has more weight than another answer about the same records."""
+        material = min(self.found.material, other.found.material)
+        complete = any(answer.decision.verdict != 'unexplained' for answer in (self, other))
+        return table.outweighs(self.told, other.told, material, complete)
+
+    def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
+        """Return rows of this answer's data as rows of all records as they were given."""
+        some = self.over_all_data(some)
+        linear = self.prepared.setup is not None
+        return table.scoped(some, LINEAR, table.HOLD) if linear else some
+
+    def over_all_data(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
+        """Return rows of the data since the onset, if there is one, as rows of all data."""
+        if self.appeared is None:
+            return some
+        before = self.appeared.before.fit
+        cost = len(before.theta) + 1.0  # the earlier data's own parameters, and the onset's time
+        some = table.since(some, before, self.data.target.size)
+        return table.scoped(some, self.appeared.scope, cost)
+
+    @property
+    def effort(self) -> Effort:
+        """What the search cost so far."""
+        return self.selection.search.effort
+
+    @cached_property
+    def onset(self) -> Onset | None:
+        """When the effects appeared; None if they were there from the beginning."""
+        if self.appeared is None:
+            return None
+        return dated(self.appeared, self.decision.final, self.decision.noise)
+
+    def of(self, selection: BeamSearch, found: Selection) -> Conclusion:
+        """Return what another selection of effects says about the same records."""
+        other = concluded(self.prepared, selection, found, self.line)
+        return replace(other, appeared=self.appeared)
+
+    def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
+        """Return another answer about the same records, if it is complete or leaves less.
+
+        Materially less, that is: then structure had passed for noise with this answer.
+        """
+        if found is None:
+            return None
+        other = self.of(selection, found)
+        more = removed(self.found.final, found.final) >= self.found.material
+        return other if more or other.decision.verdict != 'unexplained' else None
+
+
+def concluded(
+    prepared: Prepared, selection: BeamSearch, found: Selection, line: Line | None
+) -> Conclusion:
+    """Return the conclusion from a selection of effects, with effects of the measurement.
+
+    Args:
+        prepared: the records.
+        selection: the search.
+        found: its result.
+        line: hum that was removed from the data before.
+    """
+    search, settings = selection.search, selection.settings
+    assert search.scorer is not None
+    data = search.data
+    seen = at_recorded_rate.find(data, found, settings, line)
+    chosen = found.final if found.final.effects else found.singles[0]
+    generic = regression.compare(data, search.scorer, found.base, chosen)
+    decision = decide(found, seen, data, settings, generic)
+    return Conclusion(
+        prepared, data, search.scorer, line, found, seen, generic, decision, selection,
+        found.steps,
+    )  # fmt: skip
+
+
+def searched(
+    prepared: Prepared,
+    search: Search,
+    line: Line | None,
+    settings: Thresholds,
+    tell: Progress,
+    earlier: Conclusion | None = None,
+) -> Conclusion:
+    """Search for what the model lacks, one effect at a time; return the conclusion.
+
+    Args:
+        prepared: the records.
+        search: refits structures to the fitting part.
+        line: hum that was removed from the data before.
+        settings: thresholds.
+        tell: takes progress.
+        earlier: conclusion from the same samples, cleaned differently, to continue from.
+    """
+    selection = BeamSearch(search, settings, tell)
+    if earlier is None or not earlier.found.final.effects:
+        named = selection.run()
+    else:
+        named = selection.resumed(earlier.selection.search, earlier.found)
+        named = replace(named, steps=(*earlier.history, *named.steps))
+    if settings.use_force:
+        before = named.final
+        named, told = force_ranking.decided(search, named, settings)
+        if named.final.effects != before.effects:
+            step = SearchStep.to(named.final, 'the name that the force tells')
+            named = replace(named, steps=(*named.steps, step))
+        prepared = replace(prepared, notes=(*told, *prepared.notes))
+    return concluded(prepared, selection, named, line)

@@ -1,0 +1,1 @@
+"""Words from numbers: the reported diagnosis, its headline, advice and next experiment."""

@@ -1,0 +1,139 @@
+"""The one line of a diagnosis, from the numbers that its notes, JSON and exit code have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.learned.term import LearnedTerm
+from actuator_glue.diagnosis.scopes.onset import Onset
+from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.verdict.detect import Alarm
+from actuator_glue.diagnosis.verdict.held_out import HeldOutError
+from actuator_glue.diagnosis.verdict.verdict import LIKELY, excuse, likely, misses
+from actuator_glue.diagnosis.verdicts import Verdict
+from actuator_glue.json_value import Json
+from actuator_glue.records import source_name
+
+
+class Told(Protocol):
+    """What the line is made of; the attributes are those of `DiagnosisData`."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return the verdict."""
+        ...
+
+    @property
+    def effects(self) -> Sequence[Finding]:
+        """Return additions that are supported."""
+        ...
+
+    @property
+    def learned(self) -> Sequence[LearnedTerm]:
+        """Return terms among them that were learned."""
+        ...
+
+    @property
+    def error(self) -> HeldOutError:
+        """Return held-out error before and after."""
+        ...
+
+    @property
+    def alarm(self) -> Alarm:
+        """Return why Eq. (2) is not enough, or is."""
+        ...
+
+    @property
+    def remaining(self) -> Json:
+        """Return where the unexplained residual lies."""
+        ...
+
+    @property
+    def onset(self) -> Onset | None:
+        """Return when the effects appeared, if not at the beginning."""
+        ...
+
+    @property
+    def setup(self) -> WrongSetup | None:
+        """Return another set-up that explains the records far better."""
+        ...
+
+
+def _named(effect: Finding, found: Told) -> str:
+    equations = [term.numbers for term in found.learned if term.name == effect.name]
+    if equations:
+        term = f'a learned term {effect.name} ({equations[0]})'
+        return f'{effect.cause} in another shape, {term}' if effect.cause else term
+    where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
+    if not likely(effect):
+        return (
+            f'something that looks most like {effect.name} ({_share(effect.probability)}){where}'
+        )
+    if effect.probability < LIKELY:
+        shares = {r.name: r.probability for r in effect.rivals}
+        tied = (effect.name, *effect.alternatives)
+        return f'one of {", ".join(f"{n} ({_share(shares[n])})" for n in tied)}{where}'
+    others = f' (or {", ".join(effect.alternatives)})' if effect.alternatives else ''
+    return effect.name + where + others
+
+
+def _share(probability: float) -> str:
+    return f'{100 * probability:.2g} %'
+
+
+def _noise(found: Told) -> str:
+    """State the noise, by itself or relative to the error, and its known causes."""
+    floor = found.error.noise_floor
+    parts = [f'{1e6 * (e.noise or 0.0):.1f} um by {e.name}' for e in found.effects if e.noise]
+    text = f'noise {1e6 * floor:.1f} um'
+    if misses(found.error, found.alarm.threshold):
+        times = found.error.after / floor if floor > 0.0 else math.inf
+        text = f'{times:.1f} times the noise of {1e6 * floor:.1f} um'
+    return f'{text} ({", ".join(parts)})' if parts else text
+
+
+def _errors(found: Told, named: bool) -> str:
+    """State the held-out error; where there are two, first the one behind the verdict."""
+    error = found.error
+
+    def change(before: float | None, after: float) -> str:
+        start = f'{1e6 * before:.1f} -> ' if named and before is not None else ''
+        return f'{start}{1e6 * after:.1f} um'
+
+    best = change(error.before, error.after)
+    other = excuse(error, found.alarm.threshold)
+    if other is None:
+        return best
+    return f'{change(other.before, other.after)} {other.how} ({best} {other.otherwise})'
+
+
+def headline(found: Told) -> str:
+    """Return the verdict in one line, never more than the held-out part confirms.
+
+    A wrong set-up is reported first.
+    """
+    if found.setup is not None:
+        return f'{found.setup.sentence()}; {_verdict(found)}'
+    return _verdict(found)
+
+
+def _verdict(found: Told) -> str:
+    names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
+    enough = 'the model is enough'
+    if found.onset is not None:
+        when = f' since {found.onset.time:.1f} s of {source_name(found.onset.source)}'
+        names += when if names else ''
+        enough += f'{when}, where its parameters changed'
+    change = f'held-out error {_errors(found, bool(names))}, {_noise(found)}'
+    if found.verdict == 'undecided':
+        asked = f'for {names}, the held-out part does not' if names else 'for nothing'
+        return f'undecided: the fitting records ask {asked}; {change}'
+    if found.verdict == 'unexplained':
+        rest = f'{1e6 * found.remaining["left"]:.1f} um of structure in the fitting records remain'
+        if not names:
+            return f'the model is not enough and no addition is supported: {change}; {rest}'
+        return f'added, but not the whole story: {names}; {change}; {rest}'
+    return f'missing: {names}; {change}' if names else f'{enough}: {change}'

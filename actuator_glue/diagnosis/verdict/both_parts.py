@@ -1,0 +1,98 @@
+"""The verdict of both parts of the records: one look at the held-out part checks the answer.
+
+The fitting part chose the structure; the held-out part decided nothing, and confirms it or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.learned.term import any_learned
+from actuator_glue.diagnosis.posterior import agreement
+from actuator_glue.diagnosis.posterior.agreement import Homogeneity
+from actuator_glue.diagnosis.posterior.answer_posterior import AnswerPosterior, estimates
+from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.search.fitting_verdict import Decision
+from actuator_glue.diagnosis.verdict import findings, held_out_reach, verdict
+from actuator_glue.diagnosis.verdict.held_out import HeldOutError
+from actuator_glue.diagnosis.verdict.held_out_look import Curves, verify
+from actuator_glue.diagnosis.verdicts import COMPLETE, Verdict
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.records import Array
+
+
+@dataclass(frozen=True)
+class BothParts:
+    """Verdict and evidence of both parts.
+
+    Attributes:
+        verdict: see DiagnosisData.
+        decision: that of the fitting part, its certainty limited by both parts.
+        effects: additions with sizes, rivals and probabilities.
+        error: held-out error before and after.
+        coverage: share of held-out samples in the 95 % band, before and after.
+        curves: simulations and bands of both parts, for pictures.
+        stretches: sizes of each effect in halves of the records.
+        estimates: of all parameters of the reported structure.
+        estimates_before: of Eq. (2)'s without any addition.
+        draws: posterior draws (m, p) that the estimates summarise.
+        setup: another set-up that explains the records; None for the one given.
+    """
+
+    verdict: Verdict
+    decision: Decision
+    effects: tuple[Finding, ...]
+    error: HeldOutError
+    coverage: tuple[float, float]
+    curves: Curves
+    stretches: dict[str, Homogeneity]
+    estimates: dict[str, Estimate]
+    estimates_before: dict[str, Estimate]
+    draws: Array
+    setup: WrongSetup | None
+
+
+def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) -> BothParts:
+    """Look at the held-out part once, and return the verdict of both parts.
+
+    Args:
+        drawn: the answer of the fitting part and its posterior.
+        other: another set-up under which Eq. (2) explains the records far better, if there is one.
+        seed: seed of the intervals and of the sham effect.
+        each: simulates records, several at a time if it can.
+    """
+    result, before, after = drawn.result, drawn.before, drawn.after
+    decision, found = result.decision, result.found
+    held, fitted = (replace(d, each=each) for d in (result.prepared.held, result.data))
+    error, coverage, curves = verify(
+        fitted, held, before, after, decision.noise, seed, result.line, len(found.singles)
+    )
+    error = held_out_reach.reached_by_both(
+        error, found.material, result.scorer, held, before, after
+    )
+    judged = verdict.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
+    described = any_learned(decision.final.structure)
+    if other is not None and described and judged in COMPLETE:
+        # A learned term that another set-up makes unnecessary describes the wrong set-up.
+        judged = 'unexplained'
+    draws, fixed = drawn.spread(judged in COMPLETE)
+    sizes = estimates(drawn.space, after.model, draws, fixed)
+    certain = verdict.certainty(decision.certainty, error, found.material)
+    decision = replace(decision, certainty=certain)
+    stretches = agreement.agreement(decision.final, result.scorer)
+    effects = findings.of(decision, found, sizes, stretches)
+    return BothParts(
+        verdict=verdict.named(judged, effects),
+        decision=decision,
+        effects=effects,
+        error=error,
+        coverage=coverage,
+        curves=curves,
+        stretches=stretches,
+        estimates=sizes,
+        estimates_before=drawn.estimates_before(),
+        draws=draws,
+        setup=result.prepared.setup or (None if judged in COMPLETE else other),
+    )

@@ -1,0 +1,164 @@
+"""The alarm: is there structure in the residual of Eq. (2), and of what kind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy
+
+from actuator_glue.diagnosis.measured.measurement import Measured
+from actuator_glue.diagnosis.score.scorer import splits_of
+from actuator_glue.diagnosis.search.fitting_verdict import Decision
+from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.noise import Split, split
+from actuator_glue.json_value import JsonObject
+from actuator_glue.records import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm(JsonObject):
+    """Why (or why not) the model of Eq. (2) is not enough.
+
+    Attributes:
+        raised: significant and material.
+        structured: rms of the part of the residual that is a function of the command [m].
+        threshold: materiality threshold for it [m].
+        noise: rms of the rest [m].
+        p_value: of the structure under the fitted base model with its own coloured noise.
+        false_alarms: probability of any addition on a healthy machine, as asked for.
+        nats: evidence that an addition must have at this level.
+        tests: further statistics shown to people (whiteness, harmonics, drift, ...).
+    """
+
+    raised: bool
+    structured: float
+    threshold: float
+    noise: float
+    p_value: float
+    false_alarms: float = math.nan
+    nats: float = math.nan
+    tests: dict[str, float] = field(default_factory=dict)
+
+
+_RESAMPLES = 99
+_LAGS = 20
+
+
+def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
+    """Gaussian noise (size,) with the noise density of a split: the null of the alarm [m]."""
+    whole = scipy.fft.next_fast_len(size, real=True)
+    frequency = np.asarray(np.fft.rfftfreq(whole, period), dtype=np.float64)
+    density = part.density(frequency)
+    # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
+    spectrum = np.sqrt(0.25 * density * whole / period) * (
+        rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))
+    )
+    spectrum[0] = 0.0
+    return np.fft.irfft(spectrum, whole)[:size]
+
+
+def p_value(data: Data, splits: list[Split], seed: int, each: Each = map) -> float:
+    """Bootstrap p-value of the structure of all records under stationary noise."""
+    observed = sum(s.mean_square - s.noise**2 for s in splits)
+
+    def by_chance(number: int) -> float:
+        rng, total = np.random.default_rng([seed, 2, number]), 0.0
+        for part, where, period in zip(splits, data.parts, data.periods, strict=True):
+            again = split(surrogate(part, where.stop - where.start, period, rng), period)
+            total += again.mean_square - again.noise**2
+        return total
+
+    above = sum(total >= observed for total in each(by_chance, range(_RESAMPLES)))
+    return (1 + above) / (_RESAMPLES + 1)
+
+
+def ljung_box(error: Array) -> float:
+    """P-value of the first 20 autocorrelations of a residual (n,) under whiteness.
+
+    Lag by lag: a library's correlation over all lags takes time with the square of the length.
+    """
+    e, n = error - error.mean(), len(error)
+    lags = np.arange(1, _LAGS + 1)
+    r = np.array([e[k:] @ e[:-k] for k in lags]) / (float(e @ e) or 1.0)
+    return float(scipy.stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - lags)), _LAGS))
+
+
+def _even_odd(error: Array, output: Array) -> tuple[float, float]:
+    """Shares of the error explained by even and by odd powers of displacement and velocity."""
+    x = output / max(float(np.abs(output).max()), 1e-12)
+    v = np.gradient(output)
+    v = v / max(float(np.abs(v).max()), 1e-30)
+    even = np.stack([x**2, v**2, x * v, np.abs(x), np.abs(v), np.ones_like(x)])
+    odd = np.stack([x**3, v**3, x**2 * v, x * v**2, np.sign(v), x * np.abs(x), v * np.abs(v)])
+    shares = []
+    for basis in (even, odd):
+        weights, *_ = np.linalg.lstsq(basis.T, error, rcond=1e-10)
+        shares.append(1.0 - float(np.mean((error - weights @ basis) ** 2) / np.mean(error**2)))
+    return shares[0], shares[1]
+
+
+def statistics(data: Data, error: Array) -> dict[str, float]:
+    """Statistics of a residual that people look at.
+
+    ljung_box_p (smallest over records, 20 lags), input_correlation (largest normalised
+    cross-correlation with the command within 0.5 s), even_share and odd_share (of variance),
+    trend (m/s, largest).
+    """
+    out = {
+        'ljung_box_p': 1.0,
+        'input_correlation': 0.0,
+        'even_share': 0.0,
+        'odd_share': 0.0,
+        'trend': 0.0,
+    }
+    rows = zip(
+        data.records,
+        data.masks,
+        data.split(error),
+        data.split(data.target - error),
+        data.times,
+        data.periods,
+        strict=True,
+    )
+    for record, mask, e, y, t, period in rows:
+        out['ljung_box_p'] = min(out['ljung_box_p'], ljung_box(e))
+        u = record.command[mask] - record.command[mask].mean()
+        lags = round(0.5 / period)
+        cross = scipy.signal.correlate(e - e.mean(), u, mode='same', method='fft')
+        near = cross[len(e) // 2 - lags : len(e) // 2 + lags + 1]
+        norm = float(np.sqrt(((e - e.mean()) ** 2).sum() * (u**2).sum())) or 1.0
+        out['input_correlation'] = max(out['input_correlation'], float(np.abs(near).max()) / norm)
+        even, odd = _even_odd(e, y)
+        out['even_share'] = max(out['even_share'], even)
+        out['odd_share'] = max(out['odd_share'], odd)
+        slope = float(np.polyfit(t, e, 1)[0])
+        if abs(slope) > abs(out['trend']):
+            out['trend'] = slope
+    return out
+
+
+def alarm_of(
+    found: Selection,
+    seen: tuple[Measured, ...],
+    decision: Decision,
+    data: Data,
+    seed: int,
+    level: float,
+    each: Each = map,
+) -> Alarm:
+    """Describe the alarm behind the decision; `level` is the probability of false alarms."""
+    error = found.base.fit.error
+    return Alarm(
+        raised=decision.verdict != 'none',
+        structured=max([found.structure, *found.removed.values(), *(m.rms for m in seen)]),
+        threshold=found.material,
+        noise=found.noise,
+        p_value=p_value(data, splits_of(data, error), seed, each),
+        false_alarms=level,
+        nats=found.nats,
+        tests=statistics(data, error),
+    )

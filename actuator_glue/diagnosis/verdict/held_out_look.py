@@ -1,0 +1,217 @@
+"""One look at the held-out part: error before and after, intervals, coverage, a sham effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.diagnosis.measured import hum
+from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.posterior.answer_posterior import Side
+from actuator_glue.diagnosis.posterior.simulation_spread import spread
+from actuator_glue.diagnosis.samples import record_zero
+from actuator_glue.diagnosis.score.scorer import BLOCK, pooled, splits_of
+from actuator_glue.diagnosis.verdict.held_out import HeldOutError
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import rms
+from actuator_glue.records import Array
+
+# Per side: simulation and half width of the band, of the fitting and of the held-out part.
+Curves: TypeAlias = dict[str, tuple[Array, Array, Array, Array]]
+
+_RESAMPLES = 1000
+_NORMAL_95 = 1.959964
+
+
+def bootstrap(
+    errors: tuple[Array, Array], floor: float, data: Data, rng: np.random.Generator
+) -> list[tuple[float, float]]:
+    """95 % block-bootstrap intervals, the same blocks for all of them.
+
+    Args:
+        errors: error before and after at the counted samples, (N,) each [m].
+        floor: noise of these samples [m].
+        data: gives the block length; blocks are as long as a residual is correlated.
+        rng: random numbers.
+
+    Returns:
+        Intervals of the rms before and after [m], and of the share removed of what exceeds the
+        noise.
+    """
+    length = max(1, round(BLOCK / min(data.periods)))
+    edges = np.arange(0, data.target.size, length)
+    sizes = np.diff(np.append(edges, data.target.size))
+    pick = rng.integers(0, len(edges), (_RESAMPLES, len(edges)))
+    counts = sizes[pick].sum(axis=1)
+    before, after = (
+        np.add.reduceat(error**2, edges)[pick].sum(axis=1) / counts for error in errors
+    )
+    removable = np.maximum(before - floor**2, 1e-6 * before)
+    return [
+        (float(low), float(high))
+        for low, high in (
+            np.quantile(values, [0.025, 0.975])
+            for values in (np.sqrt(before), np.sqrt(after), (before - after) / removable)
+        )
+    ]
+
+
+def _sham(
+    fit: Data,
+    held: Data,
+    side: Side,
+    errors: tuple[Array, Array],
+    sizes: tuple[int, int],
+    seed: int,
+) -> float:
+    """Held-out rms after regressing on responses to commands that were never applied.
+
+    Phase-randomised copies of the command run through the same model: as flexible as a real
+    effect and as smooth, but knowing nothing of the actuator. Like an effect, the sham is the best
+    on the fitting part among as many as were tried.
+
+    Args:
+        fit: the fitting part.
+        held: the held-out part.
+        side: Eq. (2) refitted.
+        errors: its error on both parts [m].
+        sizes: parameters of a sham, and how many shams are tried.
+        seed: seed of the phases.
+    """
+    count, tried = max(1, sizes[0]), max(1, sizes[1])
+    # As many responses as shams: each sham takes `count` neighbouring ones.
+    here = _responses(fit, side, max(tried, count), seed)
+    commands = [[id(record.command) for record in data.records] for data in (fit, held)]
+    folded = commands[0] == commands[1]  # stretches of the same records
+    there = here if folded else _responses(held, side, max(tried, count), seed)
+    features = [
+        np.hstack([rows[:, mask] for rows, mask in zip(found, data.masks, strict=True)])
+        for data, found in ((fit, here), (held, there))
+    ]
+    left, out = np.inf, 0.0
+    for first in range(tried):
+        use = np.arange(first, first + count) % len(features[0])
+        weights, *_ = np.linalg.lstsq(features[0][use].T, errors[0], rcond=1e-6)
+        fitted = rms(errors[0] - weights @ features[0][use])
+        if fitted < left:
+            left, out = fitted, rms(errors[1] - weights @ features[1][use])
+    return out
+
+
+def _responses(data: Data, side: Side, count: int, seed: int) -> list[NDArray[np.float32]]:
+    """Responses to phase-randomised copies of each record's command, (count, n) a record [m]."""
+    rng = np.random.default_rng([seed, 5])
+    out = [np.empty((count, len(record)), dtype=np.float32) for record in data.records]
+    spectra = [np.fft.rfft(record.command) for record in data.records]
+    for i in range(count):
+        for record, spectrum, rows in zip(data.records, spectra, out, strict=True):
+            turn = np.exp(2j * np.pi * rng.random(len(spectrum)))
+            turn[0] = 0.0  # a mean would do what a bias does
+            fake = np.fft.irfft(spectrum * turn, len(record))
+            rows[i] = side.model.simulate(side.theta, replace(record, command=fake))
+    return out
+
+
+def noise_floor(fit: Data, held: Data, errors: tuple[Array, Array], fitted: float) -> float:
+    """Noise of the held-out part: its stationary residual, limited by the fit's noise [m].
+
+    The limit rises if its records are noisier: noise shows at most frequencies, motion at few.
+
+    Args:
+        fit: the fitting part.
+        held: the held-out part.
+        errors: residuals of one structure in both [m].
+        fitted: noise of the fitting part [m].
+    """
+    known, seen = splits_of(fit, errors[0]), splits_of(held, errors[1])
+    here = pooled(held, seen)[1]
+    if not fitted > 0.0:
+        return here
+    louder = [
+        np.median(s.psd / np.mean([np.interp(s.frequency, k.frequency, k.psd) for k in known], 0))
+        for s in seen
+    ]
+    sizes = [part.stop - part.start for part in held.parts]
+    times = float(np.average(np.maximum(louder, 1.0), weights=sizes))
+    return min(here, max(fitted, 1e-12) * float(np.sqrt(times)))
+
+
+def verify(
+    fit: Data,
+    held: Data,
+    before: Side,
+    after: Side,
+    noise: float,
+    seed: int,
+    line: Line | None = None,
+    tried: int = 1,
+) -> tuple[HeldOutError, tuple[float, float], Curves]:
+    """Compare both structures on data that decided nothing.
+
+    A line found in the fitting part belongs to the noise here: its phase in the held-out part
+    cannot be predicted. The error without it is given separately (`after_without_hum`): its
+    frequency is known, two amplitudes per record are regressed, and nothing is decided by it. The
+    error without each record's own zero is given, too. `tried` is the number of candidates, and so
+    of shams.
+
+    Returns:
+        The error, the coverage of the 95 % bands before and after, and per side the joined
+        simulation and band half width of (fit, held) for pictures.
+    """
+    rng = np.random.default_rng([seed, 3])
+    noise = float(np.hypot(noise, line.rms)) if line else noise
+    errors, halves, sims, inner = {}, {}, {}, {}
+    for key, side in (('before', before), ('after', after)):
+        sims[key] = held.simulate(side.model, side.theta)[0]
+        inner[key] = fit.simulate(side.model, side.theta)[0]
+        errors[key] = held.target - sims[key]
+    floor = noise_floor(fit, held, (fit.target - inner['after'], errors['after']), noise)
+    curves = {}
+    for key, side in (('before', before), ('after', after)):
+        deviation, reached = spread(
+            held, side.model, sims[key], side.draws, rng, reach=side is after
+        )
+        halves[key] = _NORMAL_95 * np.sqrt(deviation**2 + floor**2)
+        deviation = spread(fit, side.model, inner[key], side.draws, rng)[0]
+        width = _NORMAL_95 * np.sqrt(deviation**2 + noise**2)
+        curves[key] = (inner[key], width, sims[key], halves[key])
+    intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
+    first, last = rms(errors['before']), rms(errors['after'])
+    removable = first**2 - floor**2
+    count = len(after.theta) - len(before.theta)
+    pair = fit.target - curves['before'][0], errors['before']
+    sham = _sham(fit, held, before, pair, (count, tried), seed)
+    without_zero = record_zero.without(held, errors['after'])
+    per_record = tuple(
+        (record.source or f'record {i + 1}', rms(b), rms(a))
+        for i, (record, b, a) in enumerate(
+            zip(
+                held.records,
+                held.split(errors['before']),
+                held.split(errors['after']),
+                strict=True,
+            )
+        )
+    )
+    error = HeldOutError(
+        before=first,
+        before_ci=intervals[0],
+        after=last,
+        after_ci=intervals[1],
+        noise_floor=floor,
+        removable_removed=(first**2 - last**2) / removable if removable > 0 else 0.0,
+        removed_ci=intervals[2],
+        sham=sham,
+        after_without_hum=rms(hum.regressed(held, errors['after'], line)) if line else None,
+        records=per_record,
+        after_without_zero=rms(without_zero),
+        zeros=tuple(map(rms, held.split(without_zero))),
+        reached=reached,
+    )
+    coverage = tuple(
+        float(np.mean(np.abs(errors[key]) <= halves[key])) for key in ('before', 'after')
+    )
+    return error, (coverage[0], coverage[1]), curves
