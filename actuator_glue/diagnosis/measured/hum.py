@@ -16,35 +16,6 @@ from numpy.typing import NDArray
 from actuator_glue.inference.least_squares.data import Data, Mask
 from actuator_glue.records import Array, Record
 
-_ALIKE = 0.99  # correlation of a command with itself one period later; its size may change
-
-
-def period(command: Array) -> int:
-    """Return after how many samples a command (n,) repeats itself; n where it does not.
-
-    The first lag, up to half of the record, at which the correlation with itself is as high as at
-    lag zero, after it has been negative.
-    """
-    u = command - np.mean(command)
-    n, most = len(u), len(u) // 2
-    length = scipy.fft.next_fast_len(2 * n, real=True)
-    products = scipy.fft.irfft(np.abs(scipy.fft.rfft(u, length)) ** 2, length)[: most + 1]
-    power = np.concatenate([[0.0], np.cumsum(u**2)])
-    overlap = np.arange(n, n - most - 1, -1)
-    early, late = power[overlap], power[n] - power[n - overlap]
-    alike = products / np.sqrt(np.maximum(early * late, 1e-300))
-    apart = np.flatnonzero(alike < 0.0)
-    if not apart.size:
-        return n
-    after = alike[apart[0] :]
-    again = np.flatnonzero(after > _ALIKE)
-    if not again.size:
-        return n
-    # The top of the first peak, not its flank.
-    end = again[0] + int(np.argmax(np.append(after[again[0] :] < _ALIKE, True)))
-    return int(apart[0] + again[0] + np.argmax(after[again[0] : end]))
-
-
 # Times the level that a tenth of its neighbours exceed; 40 times the mean of noise, which one in
 # 10^6 records of noise shows.
 _CLEAR = 18.0
@@ -54,6 +25,7 @@ _PIECE = 1 << 20  # samples
 _ORDERS = 9  # harmonics of a sinusoidal command that are its response, not hum
 # Bins by which the frequency of a lasting sinusoid may be off; of it, all harmonics are excluded.
 _STEADY = 0.05
+_ALIKE = 0.99  # correlation of a command with itself one period later; its size may change
 
 
 @dataclass(frozen=True)
@@ -244,3 +216,29 @@ def _pieces(period: float, runs: Sequence[tuple[slice, slice]]) -> Iterator[tupl
             count = min(_PIECE, run.stop - run.start - begin)
             time = (run.start + begin + np.arange(count)) * period
             yield time, slice(at.start + begin, at.start + begin + count)
+
+
+def period(command: Array) -> int:
+    """Return after how many samples a command (n,) repeats itself; n where it does not.
+
+    The first lag, up to half of the record, at which the correlation with itself is as high as at
+    lag zero, after it has been negative.
+    """
+    u = command - np.mean(command)
+    n, most = len(u), len(u) // 2
+    length = scipy.fft.next_fast_len(2 * n, real=True)
+    products = scipy.fft.irfft(np.abs(scipy.fft.rfft(u, length)) ** 2, length)[: most + 1]
+    power = np.concatenate([[0.0], np.cumsum(u**2)])
+    overlap = np.arange(n, n - most - 1, -1)
+    early, late = power[overlap], power[n] - power[n - overlap]
+    alike = products / np.sqrt(np.maximum(early * late, 1e-300))
+    apart = np.flatnonzero(alike < 0.0)
+    if not apart.size:
+        return n
+    after = alike[apart[0] :]
+    again = np.flatnonzero(after > _ALIKE)
+    if not again.size:
+        return n
+    # The top of the first peak, not its flank.
+    end = again[0] + int(np.argmax(np.append(after[again[0] :] < _ALIKE, True)))
+    return int(apart[0] + again[0] + np.argmax(after[again[0] : end]))

@@ -292,6 +292,10 @@ def _least_removed(form: str, names: Sequence[str], material: float) -> float:
 def _with_names(selection: BeamSearch, term: Trial) -> Trial | None:
     """Add effects to a structure with a learned term while each is worth it.
 
+    The largest effect may be one outside the catalogue. Names are then chosen for how well they
+    imitate it, and a true name is not found beside them: for a lag and a gain that follows the
+    command's rate, a payload and a drifting gain were found.
+
     Args:
         selection: the judge; its noise stays.
         term: Eq. (2) with the description, which was added last.
@@ -314,4 +318,5 @@ def _with_names(selection: BeamSearch, term: Trial) -> Trial | None:
     return replace(current, added=term.added)
 
 
+# The move for material structure.
 LEARNED_TERMS: Final[Groups] = ((AnswerMove('learned terms', left, with_terms),),)

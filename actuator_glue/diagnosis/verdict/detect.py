@@ -18,6 +18,9 @@ from actuator_glue.inference.noise import Split, split
 from actuator_glue.json_value import JsonObject
 from actuator_glue.records import Array
 
+_RESAMPLES = 99
+_LAGS = 20
+
 
 @dataclass(frozen=True, slots=True)
 class Alarm(JsonObject):
@@ -42,10 +45,6 @@ class Alarm(JsonObject):
     false_alarms: float = math.nan
     nats: float = math.nan
     tests: dict[str, float] = field(default_factory=dict)
-
-
-_RESAMPLES = 99
-_LAGS = 20
 
 
 def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
