@@ -57,13 +57,13 @@ def diagnose(
     settings, before = settings or Thresholds(), before or Before()
     prior = before.prior
     remembered = before.remembered or Remembered()
-    effort = Effort(settings.effort, remembered.copied(), remembered)
-    done = ShareDone(effort)
 
     def tell(stage: Stage, share: float) -> None:
         if progress is not None:
             progress(stage, done(stage, share))
 
+    effort = Effort(settings.effort, remembered.copied(), remembered, tell=lambda: tell(*done.now))
+    done = ShareDone(effort)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
     known = None if prior is None else BasePrior(prior.carried, UPPER)

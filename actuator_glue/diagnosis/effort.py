@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from actuator_glue.diagnosis.remembered import Remembered
@@ -20,11 +21,13 @@ class Effort:
         most: sub-steps after which no further search is begun.
         earlier: results of an earlier diagnosis of the same machine, which save work.
         remembered: results of this one for the next.
+        tell: called between refits, from the thread that asked for the diagnosis.
     """
 
     most: float = math.inf
     earlier: Remembered = field(default_factory=Remembered)
     remembered: Remembered = field(default_factory=Remembered)
+    tell: Callable[[], None] = lambda: None
     _refits: list[int] = field(default_factory=list)
 
     def spent_on(self, found: Fit) -> Fit:

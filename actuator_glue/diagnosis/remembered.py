@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from actuator_glue.diagnosis.thresholds import STILL_REFUSED
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.records import Array
-
-# A move that was refused with this share of the present data would be refused again.
-_STILL = 0.125
 
 
 @dataclass(slots=True)
@@ -36,7 +34,7 @@ class Remembered:
             effects: of the answer.
             samples: counted now.
         """
-        return self.refused.get((what, effects), 0) >= _STILL * samples
+        return self.refused.get((what, effects), 0) >= STILL_REFUSED * samples
 
 
 @dataclass(frozen=True, slots=True)

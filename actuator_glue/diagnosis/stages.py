@@ -60,14 +60,17 @@ class ShareDone:
     Attributes:
         effort: of the search.
         missing: whether Eq. (2) leaves more than noise.
+        now: the stage that was told last, and the share of it that is done.
     """
 
     def __init__(self, effort: Effort) -> None:
         self.effort, self.missing = effort, True
+        self.now: tuple[Stage, float] = ('check', 0.0)
         self._first, self._open, self._done = 0.0, False, 0.0
 
-    def __call__(self, stage: str, share: float) -> float:
+    def __call__(self, stage: Stage, share: float) -> float:
         """Take the share of a stage that is done, in [0, 1]; return that of the whole."""
+        self.now = stage, share
         share = min(max(share, 0.0), 1.0)
         begin = next((v for name, v in _AFTER.items() if name == stage), None)
         if begin is None:

@@ -1,8 +1,14 @@
-"""Thresholds of a diagnosis: what counts as material, as decisive, as explained."""
+"""Thresholds of a diagnosis: what counts as material, as decisive, as explained.
+
+Settings that a caller may change, then limits of decisions that are fixed: each with its reason
+and, where it was measured, the machines that it came from. None of these machines judges.
+Numerical settings (iterations, tolerances, grids) stand where they are used.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,3 +64,69 @@ class Thresholds:
             stroke: amplitude of the command [m].
         """
         return max(self.noise_share * noise, self.stroke_share * stroke)
+
+
+# The weight of a structure (score/weights.py): error that costs a nat, over what matters. A tenth
+# of what matters costs four; with twice this value friction's shape was lost, with ten times a
+# delay was not told from a lag.
+TELLING: Final = 0.05
+# The same for another addition: an effect that just matters gains four nats.
+MATTERING: Final = 0.5
+
+# Of what matters: two effects that remove this share each remove what matters together.
+TOGETHER: Final = 0.5**0.5
+# Of what matters: a rough refit that removes less will not become material when finished.
+ROUGHLY: Final = 0.5
+# Times another's squared error: too far behind to be worth finishing.
+FAR: Final = 1.5
+# Squared error that signatures promise over that of a refit, at most: 2.4 at the most of the
+# learned terms of 13 machines.
+PROMISED: Final = 4.0
+# Of the best one's removed error: a tie needs nearly all of it, so a rough refit of a rival that
+# removes less is not worth finishing.
+WORTH_FINISHING: Final = 0.9
+
+# Of what the best removes: a rival that removes less is not tied, whatever its weight.
+TIED: Final = 0.5
+# Effects too small to be told, at most, whose sizes are free beside those told.
+COMPANIONS: Final = 2
+# Of what matters: on long records, simulation steps cause smaller errors beyond chance, too.
+SEEN: Final = 0.2
+# Weight among all tried that tells an effect's group from the others.
+GROUP_ALONE: Final = 0.9
+
+# Names after which learned terms are tried: they may be plainer than further names.
+NAMES_FIRST: Final = 2
+MOST_TERMS: Final = 2
+# Of what matters: a description must remove so much beyond the name it replaces, since a name says
+# what to mend.
+REPLACING: Final = 0.5
+# Of what names remove: a description that removes less beyond them is tied.
+TERM_TIED: Final = 0.1
+# Share of the squared error that a generic regression must remove to point at a place.
+POINTING: Final = 0.3
+
+# Times the other set-up's mean square: more than half of the error is the set-up's.
+SETUP_FAR: Final = 2.0
+# Structure before an onset, over the noise, at most: as `left_noise`.
+QUIET: Final = 0.6
+# Share of the squared error that impulses must carry to have swayed a search: two per cent of it
+# are one per cent of the rms error. Or the standard deviations that they move a parameter by.
+SWAYING: Final = 0.02
+MOVING: Final = 1.0
+# A move that was refused with this share of the present data would be refused again.
+STILL_REFUSED: Final = 0.125
+
+# p-value below which the sizes of an effect in stretches of the records differ, where their
+# spread is also above a share of the size: a smaller one matters to nobody. A stretch counts where
+# its standard error is below a share of the size.
+DISAGREE: Final = 0.01
+SPREAD: Final = 0.25
+STRETCH_KNOWN: Final = 0.5
+
+# Times the noise's mean square: less than half of the held-out error is noise then.
+FAR_FROM_NOISE: Final = 2.0
+# Of what matters, removed in the held-out part by what was added.
+SOME_REMOVED: Final = 0.5
+# Probability that a name, or one of those tied with it, must have to be told as missing.
+LIKELY: Final = 0.5

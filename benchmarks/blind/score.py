@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
-from actuator_glue.diagnosis.score.weights import TELLING, log_weights
+from actuator_glue.diagnosis.score.weights import log_weights
 from actuator_glue.diagnosis.search.table import additions
+from actuator_glue.diagnosis.thresholds import TELLING
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
 

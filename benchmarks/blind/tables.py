@@ -22,7 +22,7 @@ from reliability import answers
 from score import row_weights, share
 
 from actuator_glue.diagnosis.refits.candidates import mean_effects
-from actuator_glue.diagnosis.score.weights import TELLING
+from actuator_glue.diagnosis.thresholds import TELLING
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure

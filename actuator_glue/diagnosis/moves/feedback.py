@@ -12,10 +12,10 @@ import math
 from actuator_glue.diagnosis.moves import learned_terms
 from actuator_glue.diagnosis.moves.move import Asking, after
 from actuator_glue.diagnosis.refits.candidates import FAULTS, FEEDBACK
-from actuator_glue.diagnosis.refits.structures import FAR
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.thresholds import FAR
 from actuator_glue.diagnosis.trial import Trial
 
 _OWN = 2  # parameters: of the least fault and of the share that is fed back

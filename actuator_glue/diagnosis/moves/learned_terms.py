@@ -19,21 +19,19 @@ from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.moves.move import AnswerMove, Asking, Groups, left
-from actuator_glue.diagnosis.refits.structures import FAR, Search
-from actuator_glue.diagnosis.search.beam_search import MOST_TERMS, BeamSearch
+from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import FAR, MOST_TERMS, REPLACING, TERM_TIED, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 
 Way = Callable[[BeamSearch, Selection], Selection | None]
 _LONG = 100_000  # samples
-_MUCH = 0.5  # of what matters: a description must remove so much beyond the name it replaces
 # Another shape of the same cause must remove this share of what matters, and this share of the
 # stroke, which is more than the errors of decimation and simulation steps.
 _SHAPED, _STEPS = 0.1, 3e-4
-_NEARLY = 0.1  # of what names remove: a description that removes less beyond them is tied
 
 
 def plainer(result: Conclusion, asking: Asking) -> Conclusion | None:
@@ -159,7 +157,7 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     # In place of the name, or beside it, as friction may also fall with velocity.
     best = named
     in_place = [search.without(named, name) for name in told]
-    for starts, share in ((in_place, _SHAPED), ([named], _MUCH)):
+    for starts, share in ((in_place, _SHAPED), ([named], REPLACING)):
         seen = max(share * selection.material, _STEPS * search.scale().stroke)
         below = best.mean_square - 0.5 * seen**2  # or nearly
         if found.left >= selection.material:
@@ -226,7 +224,7 @@ def _additions(
                         worth.append(begun)
                 if not whole or not selection.better(trial, start, least, cost):
                     continue
-                tied = _NEARLY * removed(start, trial)
+                tied = TERM_TIED * removed(start, trial)
                 least = max(tied, selection.material) if complete else tied
             if selection.better(trial, best, least, cost):
                 worth.append(trial)
@@ -258,7 +256,7 @@ def _displaces(selection: BeamSearch, trial: Trial, best: Trial) -> bool:
     for name in best.effects:
         if name not in after.effects and not is_learned(search.entries[name]):
             rest = search.without(rest, name)
-    nearly = 1.0 - _NEARLY
+    nearly = 1.0 - TERM_TIED
     alike = removed(best, after) < selection.material
     return alike and removed(rest, best) ** 2 > nearly * removed(rest, after) ** 2
 
@@ -286,7 +284,7 @@ def _least_removed(form: str, names: Sequence[str], material: float) -> float:
 
     Half of what matters, or all of that where it is another shape of one of them.
     """
-    return material if CAUSES.get(form) in names else _MUCH * material
+    return material if CAUSES.get(form) in names else REPLACING * material
 
 
 def _with_names(selection: BeamSearch, term: Trial) -> Trial | None:

@@ -10,8 +10,9 @@ with as many parameters and more evidence. Names of more than one parameter have
 from __future__ import annotations
 
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
-from actuator_glue.diagnosis.search.companions import SEEN, beside
+from actuator_glue.diagnosis.search.companions import beside
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.thresholds import SEEN
 from actuator_glue.diagnosis.trial import Trial
 
 

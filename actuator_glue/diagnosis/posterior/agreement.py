@@ -10,14 +10,12 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis.score.scorer import Scorer
+from actuator_glue.diagnosis.thresholds import DISAGREE, SPREAD, STRETCH_KNOWN
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
 _STRETCHES = 2  # of every record
-_LEVEL = 0.01
-_SPREAD = 0.25  # of the effect's size: a significant but smaller spread matters to nobody
-_KNOWN = 0.5  # a stretch counts where its standard error is below this share of the size
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def between(trial: Trial, scorer: Scorer) -> Array:
         step = _Step.of(_free_in_each(jac, row, edges), error, len(edges))
         scale = step.scale[: step.own]
         shifts, variance = step.shift[: step.own] / scale, step.nominal / scale**2
-        told = variance < (_KNOWN * reach) ** 2
+        told = variance < (STRETCH_KNOWN * reach) ** 2
         if told.sum() > 1:
             beyond = shifts[told].var(ddof=1) - variance[told].mean()
             out[row] = np.sqrt(max(0.0, float(beyond)))
@@ -157,7 +155,7 @@ def _compare(
     covariance = inflation * inverse[:count, :count] / np.outer(scale[:count], scale[:count])
     shifts = (shift / scale)[:count]
     deviation = np.sqrt(np.diag(covariance))
-    use = deviation < _KNOWN * size
+    use = deviation < STRETCH_KNOWN * size
     values, deviation = value + shifts[use], deviation[use]
     sizes = tuple(float(v) for v in values), tuple(float(s) for s in deviation)
     freedom = int(use.sum()) - 1
@@ -171,4 +169,4 @@ def _compare(
     weights = 1.0 / deviation**2
     mean = float(np.average(values, weights=weights))
     spread = float(np.sqrt(np.average((values - mean) ** 2, weights=weights)))
-    return Homogeneity(*sizes, p, not (p < _LEVEL and spread > _SPREAD * size))
+    return Homogeneity(*sizes, p, not (p < DISAGREE and spread > SPREAD * size))

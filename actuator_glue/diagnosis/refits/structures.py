@@ -18,6 +18,7 @@ from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
 from actuator_glue.diagnosis.refits.screening import screen, signatures
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.thresholds import FAR
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
@@ -38,7 +39,6 @@ _DONE = 1e-5
 _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error: friction that leaves less is searched for globally
 _POLISHED = 4
-FAR = 1.5  # times another's squared error: too far behind to be worth finishing
 _LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a reported structure, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
 _LONG = 5.0  # times their stretches: for longer data these tell which minimum is the lowest
@@ -368,6 +368,7 @@ class Search:
             first.setdefault(frozenset((*current.effects, name)), (current, name))
         for i, _ in enumerate(self.each(lambda pair: self.add(*pair), first.values())):
             progress((i + 1) / len(first))
+            self.effort.tell()
         rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
         if together:
             every = {frozenset(t.effects): t for t in itertools.chain(*rows)}
@@ -376,8 +377,11 @@ class Search:
         else:
             worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
         last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
+        done = dict[frozenset[str], Trial]()
         polished = self.each(lambda trial: self.polish(trial, valves), last.values())
-        done = dict(zip(last, polished, strict=True))
+        for key, trial in zip(last, polished, strict=True):
+            done[key] = trial
+            self.effort.tell()
         known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
         return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
 
@@ -399,7 +403,9 @@ class Search:
 
     def without_each(self, current: Trial) -> list[Trial]:
         """Refit a structure with each of its effects taken away, in their order, as `without`."""
-        return list(self.each(lambda name: self.without(current, name), current.effects))
+        smaller = list(self.each(lambda name: self.without(current, name), current.effects))
+        self.effort.tell()
+        return smaller
 
     def without(self, current: Trial, name: str) -> Trial:
         """Refit a structure with one effect taken away, from where the larger one stands.

@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.score.scorer import Scorer
+from actuator_glue.diagnosis.thresholds import MOVING, SWAYING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Mask
 from actuator_glue.inference.least_squares.fit import Fit, fit
 from actuator_glue.records import Array
 
 _REFITS: Final = 3  # of the final model
-# Share of the squared error that impulses must carry to have swayed a search: two per cent of it
-# are one per cent of the rms error.
-_SWAYING: Final = 0.02
-_MOVED: Final = 1.0  # standard deviations of the fitted parameters
 
 
 def without_impulses(prepared: Prepared, final: Trial) -> Prepared:
@@ -53,9 +50,9 @@ def swayed(found: Fit, scorer: Scorer, taken: Array) -> bool:
 
     By their size, or by moving the fitted parameters a standard deviation in any direction.
     """
-    if taken @ taken >= _SWAYING * (found.error @ found.error):
+    if taken @ taken >= SWAYING * (found.error @ found.error):
         return True
     jac, white = scorer.whiten(found.jacobian), scorer.whiten(taken)
     jac /= np.maximum(np.linalg.norm(jac, axis=1, keepdims=True), 1e-300)
     along = jac @ white
-    return bool(along @ np.linalg.pinv(jac @ jac.T, hermitian=True) @ along > _MOVED**2)
+    return bool(along @ np.linalg.pinv(jac @ jac.T, hermitian=True) @ along > MOVING**2)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.score.scorer import pooled, splits_of
-from actuator_glue.diagnosis.score.weights import MATTERING, log_weight
+from actuator_glue.diagnosis.score.weights import log_weight
+from actuator_glue.diagnosis.thresholds import MATTERING, QUIET
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import SETTLE, Data, Mask
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
@@ -23,7 +24,6 @@ SHORTEST = 5.0  # s on either side
 HELD = 1.0  # s of held-out data after it, at least: without any, nothing can be verified
 _STEP = 0.25  # s between the times tried
 _EARLIER = (1.0, 0.75, 0.5, 0.35)
-_LEFT_NOISE = 0.6  # structure before it, over the noise, at most
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
 def quiet(before: Data, error: Array) -> bool:
     """Whether what a fit leaves of the data before a moment is noise."""
     left, noise = pooled(before, splits_of(before, error))
-    return left <= _LEFT_NOISE * noise
+    return left <= QUIET * noise
 
 
 def enough_before(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import SETUP_FAR, Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, base_fit
 from actuator_glue.inference.least_squares.stretches import stretches
@@ -21,7 +21,6 @@ from actuator_glue.json_value import JsonObject
 from actuator_glue.model.effects import scale
 from actuator_glue.records import Hold, source_name
 
-_FAR = 2.0  # times the other set-up's mean square: more than half of the error is the set-up's
 _RUNS = {
     'linear': 'running linearly between its samples (--hold linear)',
     'zoh': 'held between its samples (--hold zoh)',
@@ -131,7 +130,7 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     fit = fits[best]
     left, noise = pooled(parts[best], splits_of(parts[best], fit.error))
     material = settings.material(noise, stroke)
-    if given.rms**2 - fit.rms**2 < max(material**2, (_FAR - 1.0) * fit.rms**2):
+    if given.rms**2 - fit.rms**2 < max(material**2, (SETUP_FAR - 1.0) * fit.rms**2):
         return None
     if _nats(parts[best], fit, given) < settings.nats + math.log(len(others)):
         return None

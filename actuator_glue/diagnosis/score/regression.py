@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence
+from actuator_glue.diagnosis.thresholds import POINTING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit
@@ -18,7 +19,6 @@ from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
-_TELLING = 0.3  # share of the squared error a surrogate must remove to point at a place
 _RADII = (0.005, 0.01, 0.02, 0.05, 0.1)  # of plays, in amplitudes
 _PIECE = 1 << 13  # samples whose products are taken at a time
 
@@ -48,7 +48,7 @@ class Surrogate:
     @property
     def place(self) -> str:
         """Where in the loop the strongest feature acts; empty where it explains little."""
-        if not self.features or self.explained < _TELLING:
+        if not self.features or self.explained < POINTING:
             return ''
         if self.features[0].startswith('d/dt'):
             return 'flow or force'

@@ -23,15 +23,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.thresholds import MATTERING, TELLING
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
-
-# Error that costs a nat, over what matters: a tenth of what matters costs four. With twice this
-# value friction's shape was lost, and with ten times a delay was not told from a lag.
-TELLING = 0.05
-# The same for another addition: an effect that just matters gains four nats.
-MATTERING = 0.5
 
 
 def log_weight(left_out: float, tells: float, cost: float) -> float:

@@ -19,19 +19,13 @@ from actuator_glue.diagnosis.search.judge import Judge
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import SearchStep, Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import MOST_TERMS, NAMES_FIRST, PROMISED, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
 # Rounds and swaps where something material remains: fewer, as learned terms may help instead.
 _OPEN, _OPEN_TRIED = 1, 3
-# Names after which learned terms are tried: they may be plainer than further names.
-_NAMES = 2
-MOST_TERMS = 2
-# Squared error that signatures promise over that of a refit, at most: three at the most of some
-# hundred terms.
-_REFITTED = 4.0
 
 
 class BeamSearch(Judge):
@@ -65,7 +59,7 @@ class BeamSearch(Judge):
         for current in beam:
             names = self.search.screened(current, self.search.others(current))
             names = names[: self.settings.tried]
-            if stage > _NAMES:
+            if stage > NAMES_FIRST:
                 names += self._promising_terms(current)
             asked.append(Asked(current, tuple(names)))
         found: dict[tuple[str, ...], Trial] = {}
@@ -100,7 +94,7 @@ class BeamSearch(Judge):
             return []
         names = [n for n in self.search.terms() if n not in current.effects]
         promised = self.search.promised(current, names)
-        most = _REFITTED * below
+        most = PROMISED * below
         return [n for n, left in promised if left < most][: self.settings.terms]
 
     def overlooked(self, current: Trial) -> list[Trial]:
@@ -184,7 +178,7 @@ class BeamSearch(Judge):
                 best = self._first_worth(ranked, current, threshold)
             if best is None:
                 # No further name is worth it; a learned term was not tried yet with so few names.
-                asked = open_ and len(current.effects) < _NAMES
+                asked = open_ and len(current.effects) < NAMES_FIRST
                 described = asked and self.explained_by_term(current)
                 break
             current = self._at_its_optimum(best)
@@ -196,7 +190,7 @@ class BeamSearch(Judge):
                 threshold = max(threshold, s.later_share * removed(base, current))
             if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
-            if stage == _NAMES and (described := self.explained_by_term(current)):
+            if stage == NAMES_FIRST and (described := self.explained_by_term(current)):
                 break
             width = max(1, s.beam + 1 - stage)  # the more effects, the fewer alternatives
             ranked = self.extend(self.rescored(ranked[:width]), stage + 1)

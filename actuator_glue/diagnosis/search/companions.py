@@ -12,12 +12,8 @@ from collections.abc import Sequence
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.thresholds import COMPANIONS, GROUP_ALONE, SEEN
 from actuator_glue.diagnosis.trial import Trial
-
-_MOST = 2
-# Of what matters: on long records, simulation steps cause smaller errors beyond chance, too.
-SEEN = 0.2
-_ALONE = 0.9  # weight among all tried that tells an effect's group from the others
 
 
 def with_companions(
@@ -36,12 +32,12 @@ def with_companions(
         return final
     current = final
     least = SEEN * selection.material if least is None else least
-    for _ in range(_MOST):
+    for _ in range(COMPANIONS):
         others = [n for n in search.others(current) if not _of_one_kind(search, n, final)]
         trials = beside(selection, current, others, least)
         if not trials or not selection.better(trials[0], current, least):
             break
-        if alone and _weight_of_its_group(selection, trials) < _ALONE:
+        if alone and _weight_of_its_group(selection, trials) < GROUP_ALONE:
             break
         current = trials[0]
     return current

@@ -17,11 +17,11 @@ from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.samples.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.score.weights import TELLING, log_weight
+from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.search.gains import worth
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import TELLING, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, fit, rms

@@ -10,12 +10,9 @@ import numpy as np
 
 from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.score.scorer import evidence
+from actuator_glue.diagnosis.thresholds import WORTH_FINISHING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
-
-# Of the best one's removed error: a tie needs nearly all of it, so a rough refit of a rival that
-# removes less is not worth finishing.
-_NEARLY = 0.9
 
 
 def removed(before: Trial, after: Trial) -> float:
@@ -25,7 +22,7 @@ def removed(before: Trial, after: Trial) -> float:
 
 def left_by_rivals(rest: Trial, best: Trial) -> float:
     """Mean squared error below which a rough refit of a rival is worth finishing [m^2]."""
-    return rest.mean_square - _NEARLY**2 * (rest.mean_square - best.mean_square)
+    return rest.mean_square - WORTH_FINISHING**2 * (rest.mean_square - best.mean_square)
 
 
 def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, float]]:

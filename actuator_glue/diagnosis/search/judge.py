@@ -12,17 +12,12 @@ import numpy as np
 from actuator_glue.diagnosis.refits.structures import Search, by_score
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.score.weights import TELLING, log_weight, price
+from actuator_glue.diagnosis.score.weights import log_weight, price
 from actuator_glue.diagnosis.search.gains import removed
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import ROUGHLY, TELLING, TOGETHER, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.records import Array
-
-# Of what matters: two effects that remove this share each remove what matters together.
-_PART = 0.5**0.5
-# Of what matters: a rough refit that removes less will not become material when finished.
-_ROUGHLY = 0.5
 
 
 class Judge:
@@ -142,11 +137,11 @@ class Judge:
 
     def may_matter_below(self, current: Trial) -> float:
         """Mean squared error below which a rough refit may come to matter [m^2]."""
-        return current.mean_square - (_ROUGHLY * self.material) ** 2
+        return current.mean_square - (ROUGHLY * self.material) ** 2
 
     def part(self) -> float:
         """Error that each of two effects must remove if they matter only together [m]."""
-        return _PART * self.material
+        return TOGETHER * self.material
 
     def least(self, larger: Trial, smaller: Trial) -> float:
         """Error that a member must remove [m]: less where it makes the rest immaterial."""

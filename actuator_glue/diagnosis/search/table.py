@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.score.scorer import Scorer
-from actuator_glue.diagnosis.score.weights import MATTERING, TELLING, log_weights, price
+from actuator_glue.diagnosis.score.weights import log_weights, price
+from actuator_glue.diagnosis.thresholds import MATTERING, TELLING
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import JsonObject

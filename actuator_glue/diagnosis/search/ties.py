@@ -19,12 +19,11 @@ from actuator_glue.diagnosis.refits.structures import Search
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, inflation
 from actuator_glue.diagnosis.search.gains import removed, standard_error
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import TIED, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
 _NORMAL_95 = 1.959964
-_SAME = 0.5  # of what the best removes: a rival that removes less is not tied
 _LEAST = 1e-3  # least probability of the reported name that odds are relative to
 
 
@@ -50,7 +49,7 @@ def compare(
     out = [Rival(best.added, 0.0, 0.0, 0.0, True, 1.0 / total)]
     for trial, share in zip(trials, odds[:-1], strict=True):
         near = share > math.exp(-settings.tie_nats)
-        tied = near and removed(rest, trial) > _SAME * explained
+        tied = near and removed(rest, trial) > TIED * explained
         nats = max(0.0, evidence(best.scores, trial.scores))
         stderr = standard_error(best.scores - trial.scores)
         limit = _limit(trial, best.added, scorer) if near else None

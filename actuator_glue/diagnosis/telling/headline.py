@@ -10,9 +10,10 @@ from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.scopes.onset import Onset
 from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.thresholds import LIKELY
 from actuator_glue.diagnosis.verdict.detect import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
-from actuator_glue.diagnosis.verdict.verdict import LIKELY, excuse, likely, misses
+from actuator_glue.diagnosis.verdict.verdict import excuse, likely, misses
 from actuator_glue.diagnosis.verdicts import Verdict
 from actuator_glue.json_value import Json
 from actuator_glue.records import source_name

@@ -7,14 +7,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from actuator_glue.diagnosis.finding import Finding
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import FAR_FROM_NOISE, LIKELY, SOME_REMOVED, Thresholds
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdicts import Verdict
 
 _LATER = Thresholds().later_share  # of what was removed: less is negligible
-_FAR = 2.0  # times the noise's mean square: less than half of the held-out error is noise then
-_SOME = 0.5  # of what matters, removed in the held-out part by what was added
-LIKELY = 0.5  # probability that a name, or one of those tied with it, must have
 
 
 def far(error: HeldOutError, material: float, left: float | None = None) -> bool:
@@ -25,7 +22,7 @@ def far(error: HeldOutError, material: float, left: float | None = None) -> bool
     """
     left = error.after if left is None else left
     beyond = left**2 - error.noise_floor**2
-    return beyond > max(material**2, (_FAR - 1.0) * error.noise_floor**2)
+    return beyond > max(material**2, (FAR_FROM_NOISE - 1.0) * error.noise_floor**2)
 
 
 def misses(error: HeldOutError, material: float, left: float | None = None) -> bool:
@@ -53,7 +50,7 @@ def takes_nothing(error: HeldOutError, material: float) -> bool:
 
     That is less than half of what matters: `material` [m].
     """
-    return error.before**2 - error.after**2 < (_SOME * material) ** 2
+    return error.before**2 - error.after**2 < (SOME_REMOVED * material) ** 2
 
 
 def borne_out(error: HeldOutError, material: float) -> bool:
