@@ -26,7 +26,6 @@ from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
-from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -107,12 +106,12 @@ def _row(search: Search, trial: Trial, rest: Structure, tried: int) -> Row:
 
 
 def _fitted(search: Search, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:
-    effects = tuple(n for n in CATALOGUE if n in start.effects or n == name)
-    model = OneRecord(effects, name, records)
+    structure = search.structure(*start.effects, name)
+    model = OneRecord(structure, name, records)
     thetas = search.screen(start, name)[1]
     found = fit(search.data, model, thetas)
     assert search.scorer is not None
-    return Trial(Structure(effects), name, found, search.scorer.block_scores(found), model)
+    return Trial(structure, name, found, search.scorer.block_scores(found), model)
 
 
 def _rescored(search: Search, trial: Trial) -> Trial:

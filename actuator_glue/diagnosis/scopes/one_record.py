@@ -15,13 +15,13 @@ class OneRecord:
     """A structure one of whose effects acts in some records only.
 
     Args:
-        effects: all effects.
+        structure: with all effects, learned terms among them.
         own: the effect that acts in `records` only.
         records: these records.
     """
 
-    def __init__(self, effects: tuple[str, ...], own: str, records: tuple[Record, ...]) -> None:
-        self._inner = Structure(effects)
+    def __init__(self, structure: Structure, own: str, records: tuple[Record, ...]) -> None:
+        self._inner = structure
         self.own, self.records = own, records
         self._off = [float(p.neutral or 0.0) for p in CATALOGUE[own].parameters]
 
