@@ -57,9 +57,26 @@ def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     good = replace(error, after=11e-6, removable_removed=0.99)
     assert verdict.certainty(0.95, good, 5e-6) == 0.95
     # A verdict that says the held-out part does not ask for the name gives it no probability.
-    nothing = replace(error, before=10e-6, after=10e-6, removable_removed=0.0)
+    nothing = replace(
+        error, before=10e-6, after=10e-6, removable_removed=0.0, removed_ci=(-0.5, 0.5)
+    )
     assert verdict.of_both_parts('missing-effect', True, nothing, 5e-6) == 'undecided'
     assert verdict.certainty(0.95, nothing, 5e-6) == 0.0
+
+
+def test_held_out_records_may_show_little_of_what_matters() -> None:
+    """All that they show, removed beyond chance, confirms a name; a part of it, or chance, not."""
+    little = HeldOutError(
+        10.3e-6, (9.8e-6, 10.8e-6), 10.0e-6, (9.5e-6, 10.5e-6), 10e-6, 1.0, (0.5, 2.5), 10.3e-6
+    )
+    assert verdict.of_both_parts('missing-effect', True, little, 5e-6) == 'missing-effect'
+    assert verdict.certainty(0.95, little, 5e-6) == 0.95
+    chance = replace(little, removed_ci=(-0.2, 2.5))
+    assert verdict.of_both_parts('missing-effect', True, chance, 5e-6) == 'undecided'
+    part = replace(
+        little, before=22.25e-6, after=22.2e-6, after_ci=(20e-6, 24e-6), removed_ci=(0.01, 0.1)
+    )
+    assert verdict.of_both_parts('missing-effect', True, part, 5e-6) == 'undecided'
 
 
 def test_shares_are_odds_that_sum_to_one() -> None:

@@ -48,8 +48,11 @@ def excused(error: HeldOutError, material: float) -> bool:
 def takes_nothing(error: HeldOutError, material: float) -> bool:
     """Whether the additions at their best fit remove nothing of the held-out error.
 
-    That is less than half of what matters: `material` [m].
+    That is less than half of what matters: `material` [m]. A held-out part may show little of what
+    matters in the fitting part: to remove all of it, beyond chance, is not nothing.
     """
+    if error.removed_ci[0] > 0.0 and not misses(error, material, error.after):
+        return False
     return error.before**2 - error.after**2 < (SOME_REMOVED * material) ** 2
 
 
