@@ -2,6 +2,7 @@
 
 import ast
 import re
+import runpy
 import subprocess
 import sys
 from collections import Counter
@@ -120,19 +121,7 @@ SHARED = {
     'trial',
     'verdicts',
 }
-DIAGNOSIS = [
-    'learned',
-    'score',
-    'scopes',
-    'samples',
-    'measured',
-    'refits',
-    'search',
-    'moves',
-    'posterior',
-    'verdict',
-    'telling',
-]
+DIAGNOSIS = runpy.run_path(str(ROOT.parent / 'scripts' / 'write_house_map.py'))['DIAGNOSIS']
 # All below io but jit, which keeps compiled code in files.
 PURE = (
     'errors',
@@ -219,7 +208,7 @@ def test_rooms_of_the_diagnosis_follow_the_data() -> None:
         parts = path.relative_to(ROOT).with_suffix('').parts
         if parts[0] != 'diagnosis' or parts[1] in ('diagnose', 'pipeline', '__init__'):
             continue
-        above = DIAGNOSIS[: DIAGNOSIS.index(parts[1]) + 1] if parts[1] in DIAGNOSIS else []
+        above = DIAGNOSIS[: DIAGNOSIS.index(parts[1]) + 1] if parts[1] in DIAGNOSIS else ()
         for module, line in imports(path):
             names = module.split('.')
             if names[:2] != ['actuator_glue', 'diagnosis']:
