@@ -11,6 +11,8 @@ from actuator_glue.arguments import Output, add_force
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
 
+_AN_HOUR = 3600.0  # s
+
 
 def _told(text: str) -> str:
     """Return a text for people: printable, and in the units of the records' motion."""
@@ -116,6 +118,7 @@ def progress(title: str, total: float) -> Iterator[Callable[[float], None]]:
         console=console,
         transient=True,
         disable=not console.is_terminal,
+        speed_estimate_period=_AN_HOUR,  # shares are of the whole, so the time left is, too
     )
     with bar:
         task = bar.add_task(title, total=total)
