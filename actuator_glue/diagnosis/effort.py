@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.inference.least_squares.fit import Fit
+
+# Begun late, a search in another scope (another hold, the data since a moment) would end with its
+# largest effect alone.
+_MORE = 0.5
 
 
 @dataclass(frozen=True)
@@ -21,12 +25,14 @@ class Effort:
         most: sub-steps after which no further search is begun.
         earlier: results of an earlier diagnosis of the same machine, which save work.
         remembered: results of this one for the next.
+        beyond: share of `most` by which the search may exceed it.
         tell: called between refits, from the thread that asked for the diagnosis.
     """
 
     most: float = math.inf
     earlier: Remembered = field(default_factory=Remembered)
     remembered: Remembered = field(default_factory=Remembered)
+    beyond: float = 0.0
     tell: Callable[[], None] = lambda: None
     _refits: list[int] = field(default_factory=list)
 
@@ -34,6 +40,10 @@ class Effort:
         """Count the work of a refit, from any thread; return the refit."""
         self._refits.append(found.work)
         return found
+
+    def more(self) -> Effort:
+        """Return the same effort for a search that begins late, which may go beyond it."""
+        return replace(self, beyond=_MORE)
 
     @property
     def spent(self) -> int:
@@ -48,4 +58,4 @@ class Effort:
     @property
     def over(self) -> bool:
         """Whether the effort is spent, so that no further step of a search is begun."""
-        return self.spent >= self.most
+        return self.spent >= (1.0 + self.beyond) * self.most

@@ -38,7 +38,7 @@ def conclude(
     """
 
     def again(other: Prepared) -> Conclusion:
-        return _within(other, asking, each, effort, fixed=True)
+        return _within(other, asking, each, effort.more(), fixed=True)
 
     asking = Asking(settings, tell, again)
     return follow(_within(prepared, asking, each, effort), ACROSS, asking)

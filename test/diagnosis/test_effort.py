@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verdict.first_look import FirstLook
+from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -59,3 +61,15 @@ def test_nothing_is_missing_of_noise() -> None:
     )
     assert not seen[0].missing
     assert 'nothing that matters shows yet' in seen[0].sentence()
+
+
+def test_a_search_in_another_scope_may_go_beyond() -> None:
+    """By half of the effort, which is one and the same."""
+    effort = Effort(100.0)
+    late = effort.more()
+    for work in (90, 20):
+        effort.spent_on(Fit(np.zeros(4), np.zeros(1), np.zeros((4, 1)), np.zeros(4), work=work))
+    assert effort.over and not late.over
+    assert late.share == effort.share == 1.1
+    late.spent_on(Fit(np.zeros(4), np.zeros(1), np.zeros((4, 1)), np.zeros(4), work=40))
+    assert late.over and effort.share == 1.5

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -206,22 +205,15 @@ def _additions(
     """Return the best structure with one more term, where it is worth more than the present."""
     search, worth = selection.search, list[Trial]()
     cost = math.log(len(search.terms()))
-    # While something remains, a term may be of use that only further names make better than these.
-    below = selection.may_matter_below(best) if complete else math.inf
-    rows = selection.with_terms(starts, below)
-    plain = any(selection.left(trial) < selection.material for row in rows for trial in row)
+    # While something remains, a term in place of names may remove little more than these.
+    rows = selection.with_terms(starts, selection.may_matter_below(best) if complete else math.inf)
     for start, row in zip(starts, rows, strict=True):
         for trial in row:
             least = selection.material
             if start is not best:
                 # In place of names a term must explain the rest, and be more than tied with them:
-                # while something remains, a name is worth more than a description. Where no term
-                # explains all, one that gains more than all names is a start for adding names.
+                # while something remains, a name is worth more than a description.
                 whole = selection.left(trial) < selection.material
-                if not plain and _gain(search, trial, best) > cost:
-                    begun = _with_names(selection, trial)
-                    if begun is not None and selection.better(begun, best, least, cost):
-                        worth.append(begun)
                 if not whole or not selection.better(trial, start, least, cost):
                     continue
                 tied = TERM_TIED * removed(start, trial)
@@ -285,35 +277,6 @@ def _least_removed(form: str, names: Sequence[str], material: float) -> float:
     Half of what matters, or all of that where it is another shape of one of them.
     """
     return material if CAUSES.get(form) in names else REPLACING * material
-
-
-def _with_names(selection: BeamSearch, term: Trial) -> Trial | None:
-    """Add effects to a structure with a learned term while each is worth it.
-
-    The largest effect may be one outside the catalogue. Names are then chosen for how well they
-    imitate it, and a true name is not found beside them: for a lag and a gain that follows the
-    command's rate, a payload and a drifting gain were found.
-
-    Args:
-        selection: the judge; its noise stays.
-        term: Eq. (2) with the description, which was added last.
-
-    Returns:
-        The structure, still marked as ending with the description; None where no name is worth it,
-        or the description is not worth it with them.
-    """
-    current = term
-    while len(current.effects) < selection.settings.most:
-        if selection.left(current) < selection.material:
-            break
-        step = selection.next_worth(current)
-        if step is None:
-            break
-        current = step
-    current = selection.pruned(current)
-    if len(current.effects) < 2 or term.added not in current.effects:
-        return None
-    return replace(current, added=term.added)
 
 
 # The move for material structure.

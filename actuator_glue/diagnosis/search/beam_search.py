@@ -110,11 +110,6 @@ class BeamSearch(Judge):
         """Return the effects that promise most beside the present ones."""
         return self.search.screened(current, names, beside=True)[: self.settings.tried]
 
-    def next_worth(self, current: Trial) -> Trial | None:
-        """Return the structure with one more promising name that is worth it; None if none is."""
-        names = self.promising(current, self.search.others(current))
-        return self._first_worth(self._rough(current, names), current, self.material)
-
     def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
         """Refit a structure roughly with each further effect; finish those that may matter."""
         below = self.may_matter_below(current)
