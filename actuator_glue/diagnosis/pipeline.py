@@ -24,6 +24,14 @@ from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import fit
 
 
+class _Begun(NamedTuple):
+    """Records, the search of their samples that count, and hum that was removed from them."""
+
+    prepared: Prepared
+    search: Search
+    line: Line | None
+
+
 def conclude(
     prepared: Prepared, settings: Thresholds, each: Each, tell: Progress, effort: Effort
 ) -> Conclusion:
@@ -82,14 +90,6 @@ def _judged_again(begun: _Begun, result: Conclusion, asking: Asking) -> tuple[_B
     search = begun.search
     begun = _begun(clean, asking.settings, search.each, search.effort, fixed=True)
     return begun, _named(begun, asking, result)
-
-
-class _Begun(NamedTuple):
-    """Records, the search of their samples that count, and hum that was removed from them."""
-
-    prepared: Prepared
-    search: Search
-    line: Line | None
 
 
 def _begun(
