@@ -228,7 +228,7 @@ def respond(command, theta, k, e, substeps, sticks):
             u = command[at] if at >= 0 else 0.0
             # The mean over the step, where the next sample arrives within it.
             held = (at + 1 - late) * substeps
-            if held < 1.0 and at >= -1:
+            if held < 1.0 and -1 <= at < n - 1:
                 u = held * u + (1.0 - held) * command[at + 1]
             if e[RATE_GAIN] != 0.0 and at > 0:
                 u *= 1.0 + e[RATE_GAIN] * abs(command[at] - command[at - 1]) * RATE
