@@ -29,7 +29,7 @@ FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 _DRAWS = 100  # that are simulated over the record
 # Fewer of a long record: a hundred of ten minutes at 10 kHz take a minute.
 _FEWEST, _SIMULATED = 32, 100_000_000
-_AT_ONCE = 1 << 23  # simulated samples that are held at a time
+_AT_ONCE = 1 << 24  # simulated samples that are held at a time
 # Draws for delay and amplitude: 2.5 % of fewer are too few for the end of an interval.
 _ANSWERS = 400
 _WINDOW_DRAWS = 40  # of a window, which has little time
