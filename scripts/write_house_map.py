@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -80,6 +80,12 @@ def sizes(path: Path) -> tuple[int, int]:
     return tokens[-1].start[0] - 1, len(code)
 
 
+def _total(files: Iterable[Path]) -> tuple[int, int]:
+    """Return the lines of several files, as `sizes`."""
+    lines, code = map(sum, zip(*map(sizes, files), strict=True))
+    return lines, code
+
+
 def _rooms() -> Iterator[str]:
     yield '| room | what it holds | files | lines | of them code |'
     yield '|---|---|---:|---:|---:|'
@@ -87,7 +93,7 @@ def _rooms() -> Iterator[str]:
     for name in ('', *ROOMS):
         folder = PACKAGE / name
         files = list(folder.rglob('*.py') if name else folder.glob('*.py'))
-        lines, code = map(sum, zip(*map(sizes, files), strict=True))
+        lines, code = _total(files)
         says = first_paragraph(folder / '__init__.py') if name else 'What all rooms share.'
         rows.append((len(files), lines, code))
         cells = (f'`{name}/`' if name else '`*.py`', says, *map(str, rows[-1]))
@@ -107,7 +113,7 @@ def _diagnosis() -> Iterator[str]:
     yield '`diagnose.py` is the whole in a page.\n'
     yield from _files(folder)
     for name in DIAGNOSIS:
-        lines, code = map(sum, zip(*map(sizes, (folder / name).glob('*.py')), strict=True))
+        lines, code = _total((folder / name).glob('*.py'))
         says = first_paragraph(folder / name / '__init__.py')
         yield f'\n### {name}/\n\n{says} {lines} lines, {code} of them code.\n'
         yield from _files(folder / name)

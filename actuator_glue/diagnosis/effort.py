@@ -11,7 +11,7 @@ from actuator_glue.inference.least_squares.fit import Fit
 
 # Begun late, a search in another scope (another hold, the data since a moment) would end with its
 # largest effect alone.
-_MORE = 0.5
+_EXTENSION = 0.5
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Effort:
         self._refits.append(found.work)
         return found
 
-    def more(self) -> Effort:
+    def extended(self) -> Effort:
         """Return the same effort for a search that begins late, which may go beyond it."""
-        return replace(self, beyond=_MORE)
+        return replace(self, beyond=_EXTENSION)
 
     @property
     def spent(self) -> int:

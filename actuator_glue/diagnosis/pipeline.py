@@ -46,7 +46,7 @@ def conclude(
     """
 
     def again(other: Prepared) -> Conclusion:
-        return _within(other, asking, each, effort.more(), fixed=True)
+        return _within(other, asking, each, effort.extended(), fixed=True)
 
     asking = Asking(settings, tell, again)
     return follow(_within(prepared, asking, each, effort), ACROSS, asking)

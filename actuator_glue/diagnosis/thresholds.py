@@ -101,6 +101,10 @@ MOST_TERMS: Final = 2
 # Of what matters: a description must remove so much beyond the name it replaces, since a name says
 # what to mend.
 REPLACING: Final = 0.5
+# Another shape of the same cause must remove this share of what matters, and this share of the
+# stroke, which is more than the errors of decimation and simulation steps.
+RESHAPING: Final = 0.1
+RESHAPING_STROKE: Final = 3e-4
 # Of what names remove: a description that removes less beyond them is tied.
 TERM_TIED: Final = 0.1
 # Share of the squared error that a generic regression must remove to point at a place.

@@ -54,6 +54,17 @@ class TargetMotion:
             self._target = self._target.copy()
         self._period = period
 
+    def _of_target(self, measured: Array) -> Array:
+        """Return a measured displacement; the target was checked before.
+
+        Raises:
+            InputError: as `_checked`.
+        """
+        measured = _doubles(measured)
+        if measured.shape != self._target.shape or not np.isfinite(measured).all():
+            _checked(self._target, measured)
+        return measured
+
     @cached_property
     def _weights(self) -> tuple[Array, Array, float]:
         """Weights of a displacement in the index, (n,) each [1/m], and its frequency [Hz].
@@ -97,7 +108,7 @@ class TargetMotion:
         Raises:
             InputError: as `_checked`.
         """
-        _, measured = _checked(self._target, measured)
+        measured = self._of_target(measured)
         real, imaginary, frequency = self._weights
         measured = measured[: len(real)]
         index = real @ measured - 1j * (imaginary @ measured)
@@ -111,7 +122,7 @@ class TargetMotion:
         Raises:
             InputError: as `_checked`.
         """
-        target, measured = _checked(self._target, measured)
+        target, measured = self._target, self._of_target(measured)
         lag = self._lag(measured) if len(target) <= _LONG else lag_by_blocks(target, measured)
         error = measured - target
         return Criteria(
@@ -131,7 +142,7 @@ class TargetMotion:
         Raises:
             InputError: as `_checked`.
         """
-        target, measured = _checked(self._target, measured)
+        target, measured = self._target, self._of_target(measured)
         return float(0.5 * (target[:-1] @ measured[1:] - target[1:] @ measured[:-1]))
 
     def energy_error(self, measured: Array) -> float:
@@ -140,7 +151,7 @@ class TargetMotion:
         Raises:
             InputError: as `_checked`.
         """
-        _, measured = _checked(self._target, measured)
+        measured = self._of_target(measured)
         # Energies over the stiffness, in blocks.
         lost, most = 0.0, 0.0
         for begin in range(0, len(measured) - 1, _LONG):

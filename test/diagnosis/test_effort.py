@@ -66,7 +66,7 @@ def test_nothing_is_missing_of_noise() -> None:
 def test_a_search_in_another_scope_may_go_beyond() -> None:
     """By half of the effort, which is one and the same."""
     effort = Effort(100.0)
-    late = effort.more()
+    late = effort.extended()
     for work in (90, 20):
         effort.spent_on(Fit(np.zeros(4), np.zeros(1), np.zeros((4, 1)), np.zeros(4), work=work))
     assert effort.over and not late.over

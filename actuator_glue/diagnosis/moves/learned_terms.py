@@ -23,14 +23,19 @@ from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import FAR, MOST_TERMS, REPLACING, TERM_TIED, Thresholds
+from actuator_glue.diagnosis.thresholds import (
+    FAR,
+    MOST_TERMS,
+    REPLACING,
+    RESHAPING,
+    RESHAPING_STROKE,
+    TERM_TIED,
+    Thresholds,
+)
 from actuator_glue.diagnosis.trial import Trial
 
 Way = Callable[[BeamSearch, Selection], Selection | None]
 _LONG = 100_000  # samples
-# Another shape of the same cause must remove this share of what matters, and this share of the
-# stroke, which is more than the errors of decimation and simulation steps.
-_SHAPED, _STEPS = 0.1, 3e-4
 
 
 def plainer(result: Conclusion, asking: Asking) -> Conclusion | None:
@@ -156,8 +161,8 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     # In place of the name, or beside it, as friction may also fall with velocity.
     best = named
     in_place = [search.without(named, name) for name in told]
-    for starts, share in ((in_place, _SHAPED), ([named], REPLACING)):
-        seen = max(share * selection.material, _STEPS * search.scale().stroke)
+    for starts, share in ((in_place, RESHAPING), ([named], REPLACING)):
+        seen = max(share * selection.material, RESHAPING_STROKE * search.scale().stroke)
         below = best.mean_square - 0.5 * seen**2  # or nearly
         if found.left >= selection.material:
             below = math.inf  # where names fit badly, so do rough refits of shapes

@@ -336,7 +336,7 @@ class Search:
         self,
         current: Trial,
         names: Iterable[str] | None = None,
-        progress: Callable[[float], None] = lambda share: None,
+        progress: Callable[[float], None] | None = None,
         *,
         valves: bool = True,
         below: float = np.inf,
@@ -352,7 +352,7 @@ class Search:
     def additions_to(
         self,
         asked: Sequence[Asked],
-        progress: Callable[[float], None] = lambda share: None,
+        progress: Callable[[float], None] | None = None,
         *,
         valves: bool = True,
         together: bool = False,
@@ -367,8 +367,10 @@ class Search:
         for current, name in itertools.chain(*wanted):
             first.setdefault(frozenset((*current.effects, name)), (current, name))
         for i, _ in enumerate(self.each(lambda pair: self.add(*pair), first.values())):
-            progress((i + 1) / len(first))
-            self.effort.tell()
+            if progress is not None:
+                progress((i + 1) / len(first))
+            else:
+                self.effort.tell()
         rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
         if together:
             every = {frozenset(t.effects): t for t in itertools.chain(*rows)}

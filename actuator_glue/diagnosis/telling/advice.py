@@ -15,6 +15,7 @@ from actuator_glue.diagnosis.score.regression import Surrogate
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.telling.next_experiment import Experiment
+from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.verdict import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
@@ -22,7 +23,7 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import source_name
 
-_TELLING = 4.0  # nats, as the limit below which names count as tied
+_TELLING = Thresholds().tie_nats
 
 
 def _where(row: Json) -> str:
