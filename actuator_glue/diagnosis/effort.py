@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.inference.least_squares.fit import Fit
 
-# Begun late, a search in another scope (another hold, the data since a moment) would end with its
-# largest effect alone.
+# Share of the effort by which a search in another scope (another hold, the data since a moment)
+# may exceed it: begun late, it would end with its largest effect alone.
 _EXTENSION = 0.5
 
 

@@ -107,8 +107,8 @@ class Candidate(JsonObject):
         name: name in the catalogue.
         score: out-of-sample log score against Eq. (2) alone, effective nats.
         error: free-run rms error of base + effect, refitted [m].
-        probability: weight among the candidates and Eq. (2) alone; NaN as for `stderr`.
-        stderr: score's standard error over the blocks [nats]; NaN for effects of the measurement.
+        probability: weight among the candidates and Eq. (2) alone; NaN for measurement effects.
+        stderr: standard error of the score over the blocks [nats]; NaN likewise.
     """
 
     name: str

@@ -11,7 +11,7 @@ from actuator_glue.json_value import JsonObject
 
 @dataclass(frozen=True, slots=True)
 class SearchStep(JsonObject):
-    """One step of a search that was taken.
+    """One step that a search took.
 
     Attributes:
         what: what was done, for people.

@@ -48,7 +48,7 @@ _AFTER: dict[Stage, float] = {
 }
 # Effort of a whole search over that of its first stage: where Eq. (2) shows nothing that matters,
 # where it does, and once something was found. With these, the time left was told within a factor
-# of two at three of four moments of 20 machines (seeds 94012 to 94016).
+# of two at three quarters of the moments, on 20 machines (seeds 94012 to 94016).
 _HEALTHY, _MISSING, _FOUND = 2.0, 3.0, 2.0
 
 

@@ -18,21 +18,21 @@ class Thresholds:
     Attributes:
         noise_share: an effect is material where it removes more than this share of the noise rms,
         stroke_share: and more than this share of the command's amplitude.
-        later_share: where most is explained, a further effect must remove this share of it.
+        later_share: where most is explained, a further effect must remove this share of what was.
         false_alarms: probability of an addition on a healthy machine (score/false_alarms.py).
         nats: smallest out-of-sample evidence for another set-up or a generic surrogate.
         tie_nats: two effects cannot be told apart where their weights differ by less.
         tie_share: between equations for the same thing an error of this share of what they remove
             costs a nat.
-        left_noise: the model is unexplained where structure above this share of the noise
-        left_share: and above this share of the structure found at first remains;
+        left_noise: unexplained means that material structure is left above this share of the noise
+        left_share: and above this share of the structure found at first;
         beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
             explains more than the names do (0.28 of the noise is found in noise alone).
         most: most effects added.
         beam: structures of one effect carried on to two; one fewer with each further effect.
         evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
         tried: refits per structure after the first stage, best screened first.
-        terms: the same of learned terms.
+        terms: the same for learned terms.
         effort: work of all refits after which no further search is begun (diagnosis/effort.py).
         use_force: the recorded force chooses among tied names (search/force_ranking.py).
     """
@@ -79,8 +79,8 @@ TOGETHER: Final = 0.5**0.5
 ROUGHLY: Final = 0.5
 # Times another's squared error: too far behind to be worth finishing.
 FAR: Final = 1.5
-# Squared error that signatures promise over that of a refit, at most: 2.4 at the most of the
-# learned terms of 13 machines.
+# Squared error that signatures promise, over that of the refit, at most: for the learned terms of
+# 13 machines it was 2.4 at most.
 PROMISED: Final = 4.0
 # Of the best one's removed error: a tie needs nearly all of it, so a rough refit of a rival that
 # removes less is not worth finishing.
@@ -92,7 +92,7 @@ TIED: Final = 0.5
 COMPANIONS: Final = 2
 # Of what matters: on long records, simulation steps cause smaller errors beyond chance, too.
 SEEN: Final = 0.2
-# Weight among all tried that tells an effect's group from the others.
+# Share of the weight of all effects tried that a group must have to be told from the others.
 GROUP_ALONE: Final = 0.9
 
 # Names after which learned terms are tried: they may be plainer than further names.

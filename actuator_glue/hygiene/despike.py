@@ -59,8 +59,8 @@ def without_impulses(
         known: impulses that were found with another model; they are judged again.
 
     Returns:
-        The data with impulses replaced by interpolation (the same object where there are none),
-        and the impulses of each record.
+        The data less impulses and their share in the commands (the same object where `known` ones
+        are found again and no others), and the impulses of each record.
     """
     records, all_ = [], []
     rows = zip(data.records, data.initials, data.origins, data.factors, known, strict=True)

@@ -40,7 +40,7 @@ _ALIKE = 1.0 - 1e-8  # squared correlation: response and impulses cannot be told
 
 
 class Traces(NamedTuple):
-    """How much of a command's impulses is in the measured displacement; standard errors.
+    """Shares of a command's impulses in the measured displacement, with standard errors.
 
     Attributes:
         moved: of the response to them; 1 where they were commanded.

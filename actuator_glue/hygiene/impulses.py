@@ -42,7 +42,7 @@ class Impulses:
         samples: which samples, (m,).
         sizes: by how much each was off, (m,) [m].
         count: impulses; one may last several samples.
-        shared: how much of each is in the command of the same samples, too.
+        shared: share of their sizes that the command has in the same samples, too.
     """
 
     samples: NDArray[np.intp]
@@ -95,7 +95,7 @@ def _clusters(at: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
 
 
 def _explained(error: Array, noise: Array, taps: Array) -> tuple[list[int], Array] | None:
-    """Return samples (and by how much each is off) that leave noise; None if few do not.
+    """Return samples (and by how much each is off) without which noise is left; None if many.
 
     Args:
         error: of the prediction around what is suspect (w,) [m].
@@ -122,10 +122,10 @@ def _explained(error: Array, noise: Array, taps: Array) -> tuple[list[int], Arra
 
 
 class Motion(NamedTuple):
-    """What an accident cannot depend on.
+    """The motion at the samples of a residual, on which no accident can depend.
 
     Attributes:
-        sizes: (n,) each: the speed of the piston, say.
+        sizes: what grows with the motion, such as the speed of the piston, (n,) each.
         phase: of the motion's cycle (n,) [rad]; NaN where a reading could be off at some phases
             only.
     """
@@ -137,11 +137,11 @@ class Motion(NamedTuple):
 def find(residual: Array, motion: Callable[[], Motion], period: float) -> Impulses:
     """Return the impulses of a residual.
 
-    None where they are too many to be accidents, or come with the motion.
+    There are none where they are too many to be accidents, or come with the motion.
 
     Args:
         residual: of a model that was fitted, (n,) [m].
-        motion: returns that of the same samples; asked only where something stands out.
+        motion: returns the motion at the same samples; called only where something stands out.
         period: time between samples [s].
     """
     if len(residual) < 40 * _REACH:

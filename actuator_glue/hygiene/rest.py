@@ -21,7 +21,8 @@ def noise_at_rest(record: Record, samples: int, initial: Initial = 'rest') -> fl
 
     Args:
         record: the test.
-        samples: at its beginning, in which the command does not move; None for fewer than 100.
+        samples: number at its beginning in which the command does not move; None is returned if
+            fewer than 100 of them are surely at rest.
         initial: where the piston starts; if it does not rest there, it first comes to rest.
     """
     begin = 0 if initial == 'rest' else round(SETTLE / record.period)

@@ -24,7 +24,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.records import Array, Record
 
 _FEWEST = 50  # changes that tell a rate
-# Samples from one reading to the next; where it were fewer, any change would come when it is due.
+# Samples from one reading to the next: with fewer, any change would seem to come when it is due.
 _FASTEST, _SLOWEST = 1.9, 500.0
 _REGULAR = 0.98  # of the changes come when they are due
 _DUE = 0.6  # samples beside their time: it is somewhere within one
@@ -49,7 +49,7 @@ class Readings:
 def readings(values: Array) -> Readings | None:
     """Return the readings of a channel (n,); None where it may have one at each sample."""
     moved = values[1:] != values[:-1]
-    if 1.5 * np.count_nonzero(moved) > len(values) + 2:  # half of the changes follow another
+    if 1.5 * np.count_nonzero(moved) > len(values) + 2:  # half of them follow another at once
         return None
     at = np.flatnonzero(moved) + 1
     if len(at) < _FEWEST:

@@ -25,7 +25,7 @@ _LEAST = 0.05
 
 
 def empty_counts(settings: SamplerSettings) -> Array:
-    """Uses, acceptances and squared jumps of each move and crossover class, all zero."""
+    """Uses, acceptances, squared jumps of each move and crossover class: zeros (M + n_CR, 3)."""
     return np.zeros((len(settings.moves) + settings.crossovers, 3))
 
 
@@ -38,7 +38,7 @@ def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> 
 
     Args:
         points: the archive, in sampling coordinates.
-        counts: uses, acceptances and squared jumps.
+        counts: uses, acceptances and squared jumps, as `empty_counts`.
         settings: settings of the sampler.
         box: the prior.
     """
@@ -66,7 +66,7 @@ def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> 
 
 @njit(fastmath=False)
 def _drawn(jump: float, dimension: int) -> float:
-    """Effective draws per move whose mean squared jump is 2 p r, in standard deviations."""
+    """Effective draws per move, r/(2 - r), if its mean squared jump is 2 p r in variances."""
     r = min(0.5 * jump / dimension, 1.0)
     return r / (2.0 - r)
 
@@ -184,9 +184,9 @@ def learn(
         values: their log likelihoods, (n,).
         target: their log targets, (n,).
         total: sum of each chain's log likelihoods since this was last done, (n,); zeroed.
-        rows: the archive's buffer.
+        rows: the archive's buffer, (>= size, p).
         size: how much of it is filled.
-        counts: uses, acceptances and squared jumps of the moves.
+        counts: uses, acceptances and squared jumps, as `empty_counts`; changed in place.
         context: of which the tuning is fitted.
         burning: whether this is burn-in.
         fitted: size of the archive at the last fit.

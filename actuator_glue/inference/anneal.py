@@ -73,7 +73,7 @@ class Population(NamedTuple):
 
 
 def prior_reference(rng: np.random.Generator, size: int, box: Log) -> Reference:
-    """Latin hypercube of the uniform prior: its density in z is the Jacobian itself."""
+    """Latin hypercube of the uniform prior, whose density in z is the Jacobian |dx/dz|."""
     share = (np.arange(size)[:, None] + rng.random((size, len(box.low)))) / size
     x = box.low + box.width * rng.permuted(share, axis=0)
     return Reference(box.forward(x), UNTEMPERED.centre, UNTEMPERED.factor)
@@ -191,7 +191,7 @@ def _reweigh(
     Args:
         z: points, (m, p).
         values: their log likelihoods, (m,).
-        log_jacobian: (m,).
+        log_jacobian: ln |dx/dz| there, (m,).
         centre: see `Reference`.
         factor: see `Reference`.
         power: the one reached.

@@ -27,7 +27,7 @@ class Compiled(NamedTuple):
         size: samples counted in all records.
         shaping: G of Eq. (4), or 0 for independent Gaussian errors.
         sigma: their standard deviation [m], or 0 where it is integrated out.
-        mapped: points are coordinates of `model.ridge` and the log Jacobian is added.
+        mapped: points are coordinates of `model.identifiable` and the log Jacobian is added.
         stiffness: specimen stiffness [N/m] of those coordinates.
         low: lower bounds of the physical parameters, (p,).
         high: upper bounds, (p,).

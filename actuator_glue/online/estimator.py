@@ -537,7 +537,7 @@ class Estimator:
         ]
 
     def _compared(self, i: int) -> bool:
-        """Whether a structure stays without weight, as a reference for the others."""
+        """Whether a structure of no weight stays, as a reference for the others."""
         member = self._members[i]
         return member.before and not member.model.effects
 

@@ -25,7 +25,7 @@ from actuator_glue.online.stream import Window
 from actuator_glue.online.structures import pooled
 from actuator_glue.records import Array
 
-# Whether the time budget is spent.
+# A function that tells whether the time budget is spent.
 Expired: TypeAlias = Callable[[], bool]
 # Draws whose mean response is the forecast by which a structure's weight is judged.
 _FEW = 32
@@ -67,8 +67,8 @@ class WindowResult:
         structures: effects of each structure that the numbers above are a mixture of, the
             likeliest first, which is `model`.
         weights: their weights, fixed before the window.
-        spent: likelihood evaluations of the likeliest; of each other structure if a result of it
-            is new since the window before, else 0; then of Eq. (2) if it is only a reference.
+        spent: likelihood evaluations of the likeliest structure, then of each other one (0 without
+            a new result since the window before), last of Eq. (2) if it is only a reference.
         parts: model and moments of each structure by itself; None for one without a posterior yet.
         draws: some draws of the mixture, shape (m, p): where one structure is carried, those that
             the next window starts from.

@@ -110,7 +110,7 @@ class Carries:
 
 @dataclass(frozen=True, slots=True)
 class Estimated:
-    """A window's posterior.
+    """A window has a posterior.
 
     Attributes:
         contradicted: the alarm of the check of the prior stands.
@@ -201,7 +201,7 @@ Action: TypeAlias = Look | Carry | Say
 
 @dataclass(frozen=True, slots=True)
 class LiveState:
-    """All that decides what is done next.
+    """The state of a live diagnosis: all that decides what is done next.
 
     Attributes:
         settings: when to diagnose.

@@ -79,10 +79,10 @@ def _direct(
         x: means of the components, (m,).
         inverse: one over their standard deviations, (m,).
         drift: how far each will have moved in the next column, (m,).
-        probability: (q,).
+        probability: of each limit, (q,).
         start: where to begin, (q,).
-        limits: (q,).
-        coming: where the limits will be in the next column: a limit moves as the components that
+        limits: receives the solutions, (q,).
+        coming: receives the limits expected in the next column: one moves as the components that
             lie there do, (q,).
     """
     m = len(x)

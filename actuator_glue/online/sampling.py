@@ -65,7 +65,7 @@ class Job:
         weight: weight of the model among the structures carried, before the window.
         proposal: proposal that is carried from this window on, if it is new.
         standing: last posterior of a structure not sampled here; its forecasts use it.
-        renewed: likelihood evaluations of a rival's result new since the window before; else 0.
+        renewed: a rival's likelihood evaluations for a result since the window before; else 0.
         patience: time limit in budgets, raised after windows that ran out of time before they
             had a posterior.
     """

@@ -24,7 +24,7 @@ from actuator_glue.json_value import json_value
 from actuator_glue.online.knowledge import Known
 from actuator_glue.records import Array
 
-# c: nats that an error of m beyond the best costs if it lasts, as offline.
+# c: nats that an error of m beyond the best costs if it lasts, as in a diagnosis of records.
 COARSE = 4.0
 # Window lengths after which a forecast counts 1/e.
 MEMORY = 2.0

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from actuator_glue.inference.least_squares.data import Data, Mask
 from actuator_glue.records import Array, Record
 
-# Times the level that a tenth of its neighbours exceed; 40 times the mean of noise, which one in
-# 10^6 records of noise shows.
+# Least power of a line, over the level that a tenth of its neighbours exceed: 40 times the noise's
+# mean, which one in 10^6 records of noise reaches.
 _CLEAR = 18.0
 _NEIGHBOURS, _EXCEEDED = 201, 90.0  # bins, percentile
 _LOWEST = 2.0  # Hz

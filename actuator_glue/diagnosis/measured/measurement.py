@@ -61,7 +61,7 @@ def grid(record: Record) -> float:
 
 
 def quantisation(data: Data) -> Measured | None:
-    """Return the converter's step where the values lie on a grid."""
+    """Return quantisation by the step of the grid that the values lie on; None without a grid."""
     steps = [grid(r) for r in data.records]
     if min(steps) <= 0.0:
         return None
@@ -81,7 +81,7 @@ def _cuts(samples: int) -> list[slice]:
 
 
 def staircase(data: Data, errors: Array, simulated: Array) -> Measured | None:
-    """Return the converter's step where noise was added after it: an error periodic in position.
+    """Return quantisation with noise added after it, which shows as an error periodic in position.
 
     Rounding adds the sawtooth d (round(y/d) - y/d) of the noise-free position y, whose first
     harmonic over y has the amplitude d/pi: a period and an amplitude that must agree.

@@ -46,7 +46,7 @@ class AnswerMove:
     each_time: bool = True
 
     def made(self, result: Conclusion, asking: Asking) -> Conclusion | None:
-        """Return another answer; None where the present one stands, or did so with fewer data."""
+        """Return another answer; None where this one stands, now or already with fewer data."""
         if self.each_time:
             return self.make(result, asking)
         effects, samples = frozenset(result.found.final.effects), result.data.target.size

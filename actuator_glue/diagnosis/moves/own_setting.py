@@ -52,7 +52,7 @@ def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
 def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:
     """The record and the held-out tests of its set-up.
 
-    Those under its stiffness if no other record has it, else its own held-out blocks.
+    All tests under its stiffness if no other record has that, else those of its own command.
     """
     own = data.records[index]
     stiffness = own.known_stiffness()
@@ -64,8 +64,8 @@ def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ..
 def settings(result: Conclusion) -> Iterator[tuple[Selection | None, tuple[Row, ...]]]:
     """Yield selections with one record's own setting.
 
-    Beside Eq. (2) alone, then beside the effects found; each with a row for every setting that was
-    tried. None where the best of them leaves more structure than a model may leave.
+    First beside Eq. (2) alone, then beside the effects found. With each come rows of all settings
+    tried. It is None where the best of them leaves more structure than a model may leave.
 
     Args:
         result: the answer with effects of common size.
@@ -94,7 +94,7 @@ def settings(result: Conclusion) -> Iterator[tuple[Selection | None, tuple[Row, 
         search.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
         tried, start = [_rescored(search, t) for t in tried], search.trial(effects)
         yield _attribution(selection, found, start, tried, (left, noise)), rows
-        search.scorer = scored  # it was not taken
+        search.scorer = scored  # the setting was not taken
 
 
 def _row(search: Search, trial: Trial, rest: Structure, tried: int) -> Row:

@@ -30,7 +30,7 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         names = *usual.names, *reserved
         ways.insert(0, (Search(prepared.fit, names, usual.each, effort=usual.effort), None))
 
-    # Added to Eq. (2) alone, too, it must be better than the answer found.
+    # Even where it is added to Eq. (2) alone, it must be better than the answer found.
     below = first.selection.may_matter_below(before)
 
     def better(after: Trial, scorer: Scorer) -> bool:

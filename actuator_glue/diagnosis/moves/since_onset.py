@@ -22,8 +22,8 @@ _OTHERS = 2  # moments at most that are tried though Eq. (2) is not enough befor
 def since_onset(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Detect effects that start mid-record.
 
-    Taken where Eq. (2), or effects that always act, before a moment, and the effects found in the
-    data since then have more weight than effects that always act.
+    Taken where effects found in the data since a moment, with Eq. (2) or effects that always act
+    before it, have more weight than effects that act on all data.
     """
     since = _appeared(first, asking)
     if since is None:

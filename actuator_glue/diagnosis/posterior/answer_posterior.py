@@ -35,7 +35,7 @@ from actuator_glue.records import Array
 
 @dataclass(frozen=True)
 class Side:
-    """A refitted structure: what simulates it, best parameters and posterior draws."""
+    """A refitted structure: its model, best parameters (p,) and posterior draws (m, p)."""
 
     model: Model
     theta: Array
@@ -79,7 +79,7 @@ class AnswerPosterior:
         return ridge.left_open(self.space, self.after.model, self.result.scorer, self.after.theta)
 
     def spread(self, complete: bool) -> tuple[Array, NDArray[np.bool_]]:
-        """Return draws (m, p) widened as far as each parameter is open; which are fixed (p,).
+        """Return draws (m, p), each parameter spread as far as it is open; which are fixed (p,).
 
         Args:
             complete: whether nothing material is left; else the equations are wrong, and the

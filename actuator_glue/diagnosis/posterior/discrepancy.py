@@ -89,7 +89,7 @@ class Discrepancy:
         Minus infinity where a simulation diverged.
 
         Args:
-            errors: free-run errors.
+            errors: whitened free-run errors, (m, N).
             noise: variance of the whitened noise.
         """
         squares = sum_of_squares(errors)

@@ -133,7 +133,7 @@ def derivatives(
         around: the coordinates.
         space: the working coordinates, which know the steps of effects.
         phi: where in them, (p,).
-        response: of physical parameters (m, p), (m, N).
+        response: returns the responses (m, N) to physical parameters (m, p).
     """
     z = space.z(around.inverse(phi[None])[0][0])
     stepped = around.forward(space.theta(z + np.diag(space.steps(z))))

@@ -152,7 +152,7 @@ class Likelihood:
         return self.beside.gaussians(jac, error, self.noise, self.around.widest)
 
     def optimum(self, phi: Array) -> Optimum:
-        """Return the optimum next to coordinates.
+        """Return the optimum that steps from some coordinates lead to.
 
         On a long record the allowance for small effects may move it thousands of nats from the
         optimum without it, a distance over which no response is linear.

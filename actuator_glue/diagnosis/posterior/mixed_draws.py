@@ -63,7 +63,7 @@ def mixed(
         draws: those of the reported structure.
         told: that structure.
         others: alternatives with their odds against it.
-        sample: draws from the posterior of a structure.
+        sample: returns posterior draws (k, q) of a structure with q parameters.
         rng: random numbers.
     """
     known = [(trial, odds) for trial, odds in others if odds > _ROUND]

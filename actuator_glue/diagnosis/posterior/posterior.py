@@ -153,7 +153,7 @@ def _loosened(
 
 
 def _normal(laplace: Composed, count: int, rng: np.random.Generator) -> Array:
-    """Draw parameters (m, `count`) of a normal approximation inside the bounds."""
+    """Draw points (m, p) of a normal approximation, inside the bounds; `count` is p."""
     w = rng.standard_normal((_DRAWS, count))
     for _ in range(_HALVINGS):
         outside = ~np.isfinite(laplace.inverse(w)[1])

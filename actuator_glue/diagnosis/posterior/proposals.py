@@ -32,7 +32,7 @@ def proposed(
     """Return the coordinates to sample in, and what to draw from in them.
 
     Args:
-        around: coordinates in which the posterior is linear about each of its optima.
+        around: coordinates in which the response is taken as linear about each optimum.
         optima: at least one.
     """
     parts = _together(optima, around.widest)

@@ -30,7 +30,7 @@ def spread(
         data: records and the samples of each that count.
         model: simulates them.
         centre: what the best parameters simulate, (N,) [m].
-        draws: of their posterior, (m, d).
+        draws: of their posterior, (m, p).
         rng: random numbers, for a choice of draws.
         reach: whether the error is asked for.
 

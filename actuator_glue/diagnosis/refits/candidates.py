@@ -11,6 +11,6 @@ FAULTS = ('backlash', 'sensor-curve', 'sensor-lag')
 
 
 def mean_effects(reserved: bool = False) -> tuple[str, ...]:
-    """Return the effects with a mean response; measurement.py and hum.py find the others."""
+    """Return the effects with a mean response; diagnosis/measured finds the others."""
     names = CATALOGUE.searched(reserved)
     return tuple(n for n in names if CATALOGUE[n].variance is None and n != 'hum')

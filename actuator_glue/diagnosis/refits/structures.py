@@ -85,7 +85,7 @@ class Search:
         data: the counted samples.
         scorer: noise and blocks; set once the base is fitted.
         entries: all effects, in the order in which they stand in a structure: those of the
-            catalogue, and learned terms that only this search knows.
+            catalogue, and learned terms for these data; `wider` searches share them.
         names: effects that act on the mean response.
         each: refits candidates, several at a time if it can (the kernels release the
             interpreter lock).

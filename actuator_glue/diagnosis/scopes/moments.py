@@ -28,7 +28,7 @@ _EARLIER = (1.0, 0.75, 0.5, 0.35)
 
 @dataclass(frozen=True)
 class Moment:
-    """A time in a series of records: in which of them, and when since its first sample [s]."""
+    """A time in a series of records: index of the record, and time since its first sample [s]."""
 
     record: int
     time: float
@@ -55,7 +55,7 @@ class Moment:
 
 
 def _of(data: Data, masks: list[Mask]) -> Data:
-    """Return the records of which something counts."""
+    """Return the records of which more than a second counts, with these masks."""
     use = [i for i, m in enumerate(masks) if m.sum() * data.periods[i] > 1.0]
     return Data(
         tuple(data.records[i] for i in use),
@@ -86,8 +86,8 @@ def changes(data: Data, error: Array, jac: Array) -> Iterator[tuple[Moment, floa
 
     Args:
         data: the counted samples.
-        error: residual of a fit (n,), plain or whitened.
-        jac: its derivatives (p, n), likewise.
+        error: residual of a fit (N,), plain or whitened.
+        jac: its derivatives (p, N), likewise.
     """
     size = max(1, round(_STEP / min(data.periods)))
     edges = np.arange(0, len(error), size)

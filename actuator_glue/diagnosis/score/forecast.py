@@ -51,7 +51,7 @@ def stationary(data: Data) -> list[bool]:
 
 
 def noise(features: Features, scorer: Scorer, fit: Fit, nats: float) -> Array:
-    """Return an upper bound of the noise in each record, (records,) [m].
+    """Return an upper bound of the noise in each record, (R,) [m].
 
     That is the error of its forecasts; infinite where they are no better than chance.
 
@@ -77,9 +77,9 @@ def noise(features: Features, scorer: Scorer, fit: Fit, nats: float) -> Array:
 
 
 def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array]:
-    """Return a structure's residual less its forecasts in left-out stretches, (N,) [m].
+    """Return a structure's residual less two forecasts of left-out stretches, (N,) [m] each.
 
-    First with the structure refitted alone, then with the features, too.
+    The first forecast is of the structure refitted alone, the second of the features, too.
 
     Args:
         features: of the motion.

@@ -4,7 +4,7 @@ The residual is whitened by its own noise density, so that a coloured background
 twice. Each block is scored with parameters fitted without it: d = (J J' - J_b J_b')^-1
 (J e - J_b e_b) away from the fit, exact where the model is linear in its parameters (Cook 1977,
 for a fit that is itself the optimum: J e = 0). Where only noise is left, e and J are whitened:
-these are the optimum and the covariance of the likelihood that is sampled (posterior.py).
+these are the optimum and the covariance of the sampled one (posterior/likelihood.py).
 """
 
 from __future__ import annotations

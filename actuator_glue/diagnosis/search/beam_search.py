@@ -42,7 +42,7 @@ class BeamSearch(Judge):
         self.progress = progress
 
     def apart(self) -> BeamSearch:
-        """Return an independent copy: its additions and its noise do not change this search."""
+        """Return a copy with additions and noise of its own; it shares only the effort."""
         other = copy(self)
         other.search = replace(self.search.wider(()), entries=dict(self.search.entries))
         return other

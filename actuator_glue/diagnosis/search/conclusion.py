@@ -36,7 +36,7 @@ class Conclusion:
         prepared: the records, fitting part and held-out part.
         data: the fitting part without hum.
         scorer: noise and blocks of the final structure.
-        line: hum.
+        line: hum that was removed from the data; None for none.
         found: effects with a mean response.
         seen: measurement effects.
         generic: a generic regression to compare them with.
@@ -107,7 +107,7 @@ class Conclusion:
 
     @property
     def effort(self) -> Effort:
-        """What the search cost so far."""
+        """Effort of the search: its cost so far, and its limit."""
         return self.selection.search.effort
 
     @cached_property

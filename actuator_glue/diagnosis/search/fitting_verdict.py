@@ -24,7 +24,7 @@ class Decision:
     """Verdict on the fitting part.
 
     Attributes:
-        verdict: see DiagnosisData
+        verdict: see `DiagnosisData`.
         final: structure to go on with: all additions that are supported.
         names: its effects, named as findings.
         measured: measurement effects, named as findings.
@@ -119,7 +119,7 @@ def _band(frequency: Array, excess: Array) -> list[float]:
 
 
 def remaining(data: Data, error: Array) -> Json:
-    """Say where in time, frequency, amplitude and velocity a residual lies, per record."""
+    """Say where in time, frequency, amplitude and velocity a residual (N,) lies, per record."""
     rows = []
     splits, errors = splits_of(data, error), data.split(error)
     outputs = data.split(data.target - error)

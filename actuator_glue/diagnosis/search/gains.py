@@ -26,7 +26,7 @@ def left_by_rivals(rest: Trial, best: Trial) -> float:
 
 
 def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, float]]:
-    """Return rms error [m] and nats that each effect takes away beside the others."""
+    """Return, by effect, rms error [m] removed and nats gained beside the other effects."""
     gains, nats = {}, {}
     for name in final.effects:
         rest = search.without(final, name)

@@ -24,42 +24,42 @@ class Told(Protocol):
 
     @property
     def verdict(self) -> Verdict:
-        """Return the verdict."""
+        """The verdict."""
         ...
 
     @property
     def effects(self) -> Sequence[Finding]:
-        """Return additions that are supported."""
+        """Additions that are supported."""
         ...
 
     @property
     def learned(self) -> Sequence[LearnedTerm]:
-        """Return terms among them that were learned."""
+        """Learned terms among these."""
         ...
 
     @property
     def error(self) -> HeldOutError:
-        """Return held-out error before and after."""
+        """Held-out error before and after."""
         ...
 
     @property
     def alarm(self) -> Alarm:
-        """Return why Eq. (2) is not enough, or is."""
+        """Why Eq. (2) is not enough, or is."""
         ...
 
     @property
     def remaining(self) -> Json:
-        """Return where the unexplained residual lies."""
+        """Where the unexplained residual lies."""
         ...
 
     @property
     def onset(self) -> Onset | None:
-        """Return when the effects appeared, if not at the beginning."""
+        """When the effects appeared; None if they were there from the beginning."""
         ...
 
     @property
     def setup(self) -> WrongSetup | None:
-        """Return another set-up that explains the records far better."""
+        """Another set-up that explains the records far better; None for none."""
         ...
 
 

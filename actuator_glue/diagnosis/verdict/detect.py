@@ -101,7 +101,7 @@ def _even_odd(error: Array, output: Array) -> tuple[float, float]:
 
 
 def statistics(data: Data, error: Array) -> dict[str, float]:
-    """Statistics of a residual that people look at.
+    """Statistics of a residual (N,) [m] that people look at.
 
     ljung_box_p (smallest over records, 20 lags), input_correlation (largest normalised
     cross-correlation with the command within 0.5 s), even_share and odd_share (of variance),

@@ -27,7 +27,7 @@ class HeldOutError:
         zeros: rms error of each of `records` without its own zero.
         after_without_hum: `after` with the hum that was found regressed out of the held-out part
             (frequency known, phase not); None without hum.
-        split: 'held-out' where data were set aside.
+        split: always 'held-out': the data were set aside.
         reached: the least rms error of parameters in the 95 % region of their posterior; None
             where it was not computed.
         reached_before: the same for Eq. (2) alone; computed where additions at their best fit

@@ -19,7 +19,7 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.records import Array
 
-# Per side: simulation and half width of the band, of the fitting and of the held-out part.
+# Of 'before' and 'after': simulation and half width of its band, fitting part, then held-out part.
 Curves: TypeAlias = dict[str, tuple[Array, Array, Array, Array]]
 
 _RESAMPLES = 1000
@@ -34,7 +34,7 @@ def bootstrap(
     Args:
         errors: error before and after at the counted samples, (N,) each [m].
         floor: noise of these samples [m].
-        data: gives the block length; blocks are as long as a residual is correlated.
+        data: gives the sample period; blocks last `BLOCK`, longer than a residual is correlated.
         rng: random numbers.
 
     Returns:

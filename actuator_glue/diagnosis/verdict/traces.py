@@ -16,7 +16,7 @@ from actuator_glue.records import Array
 class Trace:
     """Curves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
 
-    `lower_*` and `upper_*` are the 95 % predictive band before and after.
+    `lower_*` and `upper_*` are the limits of the 95 % predictive band before and after (n,) [m].
     """
 
     source: str

@@ -17,8 +17,8 @@ _LATER = Thresholds().later_share  # of what was removed: less is negligible
 def far(error: HeldOutError, material: float, left: float | None = None) -> bool:
     """Whether the held-out error is far above the noise: no such answer is complete.
 
-    Whatever accounts for it: a single stretch, other parameters as likely as the best, or an
-    onset. `left` is the error in question, `after` if not given [m].
+    Not even where a single stretch, other parameters as likely as the best, or an onset account
+    for the error. `left` is the error in question, `after` if not given [m].
     """
     left = error.after if left is None else left
     beyond = left**2 - error.noise_floor**2
@@ -150,8 +150,8 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
 
     Args:
         fitted: that of the fitting part.
-        error: held-out error; where it shows more than noise, or the best additions remove nothing
-            of it, at most the share of it that they remove, with parameters as likely if need be.
+        error: held-out error. Where it is more than noise, or additions at their best fit remove
+            nothing of it, the factor is at most the share removed, with likely parameters at need.
         material: smallest error that matters [m].
     """
     nothing = takes_nothing(error, material)

@@ -134,7 +134,7 @@ def _filtered(values: Array, taps: Array, count: int) -> Array:
 
 
 def means(values: Array, count: int) -> Array:
-    """Return what `decimated` makes of a measured channel, one value for `count`."""
+    """Return what `decimated` makes of a measured channel (n,): one value for `count` samples."""
     return _filtered(values, window(count), count)
 
 

@@ -16,8 +16,8 @@ a normal score, so that a prior-dominated posterior has no wall and is normal). 
 uniform in the physical parameters: given the other coordinates, (k + alpha_2)^3 is uniform. At
 k = 0 alpha_3 does not act: it is the normal score of its place in the box; alpha_2^2 is uniform.
 
-With effects: `model.ridge_effects` says what their coordinates are, and what remains bent is
-straightened by what an earlier posterior has shown (`triangular`).
+With effects: `model.identifiable_effects` says what their coordinates are, and what remains bent
+is straightened by what an earlier posterior has shown (`triangular`).
 """
 
 from __future__ import annotations

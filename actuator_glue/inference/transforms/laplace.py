@@ -35,10 +35,10 @@ class Laplace:
         self.lower, self.upper = np.full(len(sd), -_REACH), np.full(len(sd), _REACH)
 
     def forward(self, x: Array) -> Array:
-        """Return the coordinates (m, p) of what they are made from (m, p)."""
+        """Return the coordinates z (m, p) of coordinates y (m, p)."""
         z = (x - self._centre) @ np.linalg.pinv(self.root).T
         return np.clip(z, self.lower, self.upper)
 
     def inverse(self, z: Array) -> tuple[Array, Array]:
-        """Return what coordinates (m, p) are made from, (m, p), and a constant's logarithm."""
+        """Return y (m, p) of coordinates z (m, p), and zeros (m,): |dy/dz| is constant."""
         return self._centre + z @ self.root.T, np.zeros(len(z))

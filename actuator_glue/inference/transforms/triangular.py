@@ -92,7 +92,7 @@ class Triangular:
         return np.clip(z, self.lower, self.upper)
 
     def inverse(self, z: Array) -> tuple[Array, Array]:
-        """Return coordinates (m, p) of straight ones (m, p), and a constant's logarithm (m,)."""
+        """Return y (m, p) of straight coordinates (m, p), and zeros (m,): |dy/dz| is constant."""
         y, x = np.empty_like(z), np.empty_like(z)
         _bent(z, self._width, self._mean, y)
         x[:, self._order] = self._centre + self._scale * y
