@@ -44,7 +44,7 @@ DIAGNOSIS = (
 # What strangers ask for, and the file that answers.
 QUESTIONS = (
     ('swapped channels, a wrong sign or unit are refused', 'hygiene/checks.py'),
-    ('impulses are removed before a fit', 'hygiene/despike.py'),
+    ('impulses are removed before a fit', 'hygiene/impulse_removal.py'),
     ('impulses are judged against the final model', 'diagnosis/samples/final_impulses.py'),
     ('the hold of the command is chosen', 'diagnosis/moves/other_hold.py'),
     ('an effect is found that began during a test', 'diagnosis/moves/since_onset.py'),

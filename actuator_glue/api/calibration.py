@@ -25,7 +25,7 @@ from actuator_glue.diagnosis.samples.force import check_forces
 from actuator_glue.diagnosis.verdict.residual_structure import residual_structure
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.clean import clean, common_initial
-from actuator_glue.hygiene.despike import despiked
+from actuator_glue.hygiene.impulse_removal import despiked
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains

@@ -14,7 +14,7 @@ from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.hygiene.clean import clean, common_initial, initial_state
-from actuator_glue.hygiene.despike import despiked
+from actuator_glue.hygiene.impulse_removal import despiked
 from actuator_glue.inference.least_squares.data import SETTLE, chunks
 from actuator_glue.model.effects import Scale, scale
 from actuator_glue.model.exact import Initial

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.hygiene import despike
+from actuator_glue.hygiene import impulse_removal
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.impulses import TAPS, noise_of
 from actuator_glue.inference.least_squares import decimate
@@ -226,7 +226,7 @@ def mended(
     clean = [without(r, *each) for r, each in zip(records, found, strict=True)]
     slow = [decimate.decimated(r, decimate.factor(r)) for r in clean]
     whole = replace(Data.whole(slow), initials=tuple(initials))
-    theta, out, notes = despike.trimmed(whole), list(records), []
+    theta, out, notes = impulse_removal.trimmed(whole), list(records), []
     for i, (record, smooth) in enumerate(zip(records, clean, strict=True)):
         samples, sizes = found[i]
         told = shares(record, smooth, theta, initials[i]) if len(samples) else None

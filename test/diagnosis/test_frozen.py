@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.samples.preparation import prepare
-from actuator_glue.hygiene.despike import despiked
+from actuator_glue.hygiene.impulse_removal import despiked
 from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

@@ -9,7 +9,7 @@ from actuator_glue.diagnosis.samples import final_impulses
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.hygiene import impulses
-from actuator_glue.hygiene.despike import despiked, trimmed, without_impulses
+from actuator_glue.hygiene.impulse_removal import despiked, trimmed, without_impulses
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import base_fit, fit
 from actuator_glue.model.structure import Structure

@@ -12,7 +12,7 @@ from actuator_glue.diagnosis.verdict.residual_structure import (
     residual_structure,
 )
 from actuator_glue.hygiene.clean import initial_state
-from actuator_glue.hygiene.despike import despiked
+from actuator_glue.hygiene.impulse_removal import despiked
 from actuator_glue.inference.least_squares.data import SETTLE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Hold, Record

@@ -10,7 +10,8 @@ import numpy as np
 from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
-from actuator_glue.hygiene import despike, slow_channel
+from actuator_glue.hygiene import impulse_removal as despike
+from actuator_glue.hygiene import slow_channel
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.impulses import NONE, Impulses
@@ -35,7 +36,7 @@ class Prepared:
         held: what is looked at once, after all decisions.
         notes: what else was done to the records, for people.
         folded: the held-out part are stretches of the fitting records.
-        impulses: what was taken out of each fitting record (see hygiene/despike.py).
+        impulses: what was taken out of each fitting record (see hygiene/impulse_removal.py).
         held_impulses: the same for each separate held-out record.
         setup: set-up of the records taken instead of the given one; None for the given one.
     """
