@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.clock_check import disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_samples
 from actuator_glue.io.bag_metadata import LATCHED
@@ -30,7 +31,6 @@ from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
 from actuator_glue.motion import METRES
-from actuator_glue.rate_check import disagreement, rate_by_clock
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import Setups, StreamSetup

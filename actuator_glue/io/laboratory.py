@@ -10,6 +10,7 @@ from typing import cast
 
 import numpy as np
 
+from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
@@ -17,7 +18,6 @@ from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, of_file, recognise
-from actuator_glue.rate_check import APART, disagreement, rate_by_clock
 from actuator_glue.records import Array, Hold, Record
 
 # A channel "at rest" may move by this share of its range: noise does, a test does not.

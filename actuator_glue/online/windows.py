@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_glue.clock_check import LEAST_SECONDS, RateWatch, disagreement
 from actuator_glue.errors import InputError
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
@@ -15,7 +16,6 @@ from actuator_glue.online.stream import (
     Restarted,
     Window,
 )
-from actuator_glue.rate_check import LEAST_SECONDS, RateWatch, disagreement
 from actuator_glue.records import Array, Record
 from actuator_glue.sample_block import Block, check_block
 from actuator_glue.setups import Setups, StreamSetup

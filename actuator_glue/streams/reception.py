@@ -9,9 +9,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.clock_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.errors import InputError
 from actuator_glue.io.units import FLOAT32_COUNTS
-from actuator_glue.rate_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.records import Array
 from actuator_glue.streams.clock import ClockMap
 from actuator_glue.streams.layout import TYPES, Layout, Rows

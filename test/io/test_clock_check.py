@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.rate_check import RateWatch, disagreement, rate_by_clock
+from actuator_glue.clock_check import RateWatch, disagreement, rate_by_clock
 
 
 @pytest.mark.parametrize('true', [500.0, 985.0, 1015.0, 2000.0])
