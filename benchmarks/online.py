@@ -19,10 +19,10 @@ from actuator_glue.model import commands, linear
 from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.playback import Item, at_once, give, items, replay, stream
-from actuator_glue.online.sampling import WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview
 from actuator_glue.online.structures import Proposal, Proposed
+from actuator_glue.online.window_posterior import WindowFit
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup

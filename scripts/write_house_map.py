@@ -53,7 +53,7 @@ QUESTIONS = (
     ('a tie is told', 'diagnosis/search/ties.py'),
     ('the verdict is reached', 'diagnosis/verdict/verdict.py'),
     ('the headline is written', 'diagnosis/telling/headline.py'),
-    ('a window becomes a posterior', 'online/sampling.py'),
+    ('a window becomes a posterior', 'online/window_posterior.py'),
     ('records, model and likelihood become a posterior', 'inference/posterior.py'),
     ('one effect is defined, all of it', 'model/effects/catalogue/backlash.py'),
 )

@@ -28,7 +28,6 @@ from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import identifiable
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.sampling import Job
 from actuator_glue.online.stream import (
     Contradicted,
     Dropped,
@@ -47,6 +46,7 @@ from actuator_glue.online.trust import (
     sampled_too_slowly,
     trust,
 )
+from actuator_glue.online.window_posterior import Job
 from actuator_glue.online.windows import WrongRate
 from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer, Worker

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, window_tracking
 from actuator_glue.online.job import WindowResult, renew, run
-from actuator_glue.online.sampling import Job, WindowFit
+from actuator_glue.online.window_posterior import Job, WindowFit
 from actuator_glue.workers.warm import warm_prior, warm_windows
 from actuator_glue.workers.worker import Tell
 

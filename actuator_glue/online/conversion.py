@@ -19,10 +19,10 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import WindowPrediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Known
-from actuator_glue.online.sampling import ARCHIVE, spread
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview, structure_effects, structure_name
 from actuator_glue.online.structures import Proposal
+from actuator_glue.online.window_posterior import ARCHIVE, spread
 from actuator_glue.records import Array
 from actuator_glue.sample_block import stamp_ns
 

@@ -16,7 +16,6 @@ from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Knowledge
-from actuator_glue.online.sampling import MOST_PATIENCE, Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
     Contradicted,
@@ -30,6 +29,7 @@ from actuator_glue.online.stream import (
     structure_name,
 )
 from actuator_glue.online.structures import Proposal
+from actuator_glue.online.window_posterior import MOST_PATIENCE, Job, WindowFit
 from actuator_glue.online.windows import SlidingWindows, Tally
 from actuator_glue.records import MAX_DISPLACEMENT, Array
 from actuator_glue.sample_block import Block

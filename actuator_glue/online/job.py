@@ -16,13 +16,13 @@ from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.inference.posterior import NoPosteriorError
 from actuator_glue.inference.prior_conflict import Conflict
-from actuator_glue.online import fitting, sampling
+from actuator_glue.online import fitting, window_posterior
 from actuator_glue.online.forecast import FrozenPosterior, WindowPrediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
-from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Window
 from actuator_glue.online.structures import pooled
+from actuator_glue.online.window_posterior import Job, WindowFit
 from actuator_glue.records import Array
 
 # A function that tells whether the time budget is spent.
@@ -134,7 +134,7 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
         WindowFit(
             job.window,
             one.model,
-            frozen=sampling.stands(one),
+            frozen=window_posterior.stands(one),
             failure='it is sampled beside',
             evaluations=one.renewed,
         )
@@ -169,7 +169,7 @@ def renew(job: Job) -> WindowFit:
 
 def _fit(job: Job, expired: Expired | None) -> WindowFit:
     try:
-        return sampling.fit(job, expired)
+        return window_posterior.fit(job, expired)
     except InputError as error:
         starved = isinstance(error, NoPosteriorError)
         return WindowFit(job.window, job.model, failure=str(error), starved=starved)
@@ -188,7 +188,7 @@ def _errors(job: Job) -> tuple[float, ...]:
         for j, part in enumerate(map(own.get, models)):
             if part is None:
                 continue
-            few = replace(part, draws=part.draws[sampling.spread(len(part.draws), _FEW)])
+            few = replace(part, draws=part.draws[window_posterior.spread(len(part.draws), _FEW)])
             middle = _respond(few, record.command[end:stop]).mean(axis=0)
             row[j] = np.mean((record.measured[start:stop] - middle) ** 2)
     # Of one forecast only, the latest: errors of the same samples can be compared.
@@ -240,7 +240,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
     each = _each(job, fitted, chains)
     posterior = _mixed(job, each)
     summary = moments(posterior, *model.bounds)
-    drawn = posterior[sampling.spread(len(posterior), settings.draws)]
+    drawn = posterior[window_posterior.spread(len(posterior), settings.draws)]
     scored = [p for old in job.frozen for p in _score(job, old)]
     if not limits:
         scored = [replace(p, band=p.band.slice(0, 0)) for p in scored]
@@ -276,7 +276,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
             None if draws is None else (one.model, moments(draws, *one.model.bounds))
             for one, draws in each
         ),
-        draws=posterior[sampling.spread(len(posterior), sampling.ARCHIVE)],
+        draws=posterior[window_posterior.spread(len(posterior), window_posterior.ARCHIVE)],
     )
 
 

@@ -11,10 +11,10 @@ from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, fit, renew, report
-from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Event, Failed, Preview, Rejected
 from actuator_glue.online.structures import Proposal
+from actuator_glue.online.window_posterior import Job, WindowFit
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup, from_message

@@ -16,9 +16,9 @@ from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Begun, ReplayPosition, Schedule
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.sampling import ARCHIVE, joined
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import Proposal
+from actuator_glue.online.window_posterior import ARCHIVE, joined
 from actuator_glue.records import Array, check_period
 from actuator_glue.sample_block import stamp_ns
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from actuator_glue.online.job import WindowResult, report
 from actuator_glue.online.playback import Sampled, told
-from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.stream import Event
+from actuator_glue.online.window_posterior import Job, WindowFit
 from actuator_glue.workers.warm import warm_windows
 from actuator_glue.workers.worker import DIED, DONE, Answer, Tell, Worker
 

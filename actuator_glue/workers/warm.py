@@ -14,9 +14,9 @@ from actuator_glue.model.parameters import NAMES
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import stream
-from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview
+from actuator_glue.online.window_posterior import Job
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup

@@ -14,7 +14,7 @@ from actuator_glue.nodes import estimator_worker
 from actuator_glue.nodes.estimator_worker import Tracked, computed
 from actuator_glue.online import job as window_job
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.sampling import Job
+from actuator_glue.online.window_posterior import Job
 from actuator_glue.workers.warm import warm_windows
 
 
