@@ -54,6 +54,10 @@ QUESTIONS = (
     ('the verdict is reached', 'diagnosis/verdict/verdict.py'),
     ('the headline is written', 'diagnosis/telling/headline.py'),
     ('a window becomes a posterior', 'online/window_posterior.py'),
+    (
+        'it is decided when a stream is diagnosed, and what the estimator then carries',
+        'online/when_to_diagnose.py',
+    ),
     ('records, model and likelihood become a posterior', 'inference/posterior.py'),
     ('one effect is defined, all of it', 'model/effects/catalogue/backlash.py'),
 )

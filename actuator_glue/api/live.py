@@ -16,8 +16,8 @@ from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.knowledge import Known
-from actuator_glue.online.live_diagnosis import Concluded
 from actuator_glue.online.structures import BESIDE, LEAVES, MOST, Proposal, Proposed
+from actuator_glue.online.when_to_diagnose import Concluded
 from actuator_glue.records import Array, Record
 
 # Largest share of a diagnosis' usual effort: one that takes a core more than half a minute comes

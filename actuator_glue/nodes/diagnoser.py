@@ -1,6 +1,6 @@
 """What the model lacks: diagnosis on request, or by itself when something speaks for it.
 
-What is due and what follows is decided in `online/live_diagnosis.py`.
+What is due and what follows is decided in `online/when_to_diagnose.py`.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.now import now_ns
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion
-from actuator_glue.online import live_diagnosis as live
+from actuator_glue.online import when_to_diagnose as live
 from actuator_glue.online.collect import Collector
+from actuator_glue.online.memory import Memory, looked_at
 from actuator_glue.online.stream import Event, Rejected, Restarted
 from actuator_glue.online.structures import Proposal
 from actuator_glue.setups import from_message
@@ -74,7 +75,7 @@ class DiagnoserNode(WorkingNode):
         values = self.parameters.values()
         self.collector = Collector(values['keep'])
         self.loop = live.init(diagnoser_worker.settings(values))
-        self.memory = live.Memory()
+        self.memory = Memory()
         self._remembered = Remembered()
         self._explained = Explained()
         self._last = float('-inf')
@@ -180,7 +181,7 @@ class DiagnoserNode(WorkingNode):
 
     def _look(self, wanted: live.Look) -> None:
         values = self.parameters.values()
-        records, known = live.looked_at(self.collector, self.memory, wanted.since)
+        records, known = looked_at(self.collector, self.memory, wanted.since)
         if not records:
             self._take(live.Concluded())
             return

@@ -26,8 +26,8 @@ from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.messages import fill
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.conversion import Fields, Head
-from actuator_glue.online.live_diagnosis import Concluded, LiveSettings
 from actuator_glue.online.structures import Proposal, Proposed
+from actuator_glue.online.when_to_diagnose import Concluded, LiveSettings
 from actuator_glue.records import Record
 from actuator_glue.setups import known_stiffness
 from actuator_glue.workers.worker import Tell

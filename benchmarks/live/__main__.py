@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.arguments import Folder
-from actuator_glue.online.live_diagnosis import LiveSettings
+from actuator_glue.online.when_to_diagnose import LiveSettings
 from benchmarks.live.cases import Case, NotBuiltError, all_cases, few, streamed
 from benchmarks.live.chain import chain
 from benchmarks.live.score import scored

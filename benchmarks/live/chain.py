@@ -12,11 +12,12 @@ from actuator_glue.api.live import EFFORT, concluded, given
 from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
-from actuator_glue.online import live_diagnosis as live
+from actuator_glue.online import when_to_diagnose as live
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.knowledge import Known
+from actuator_glue.online.memory import Memory, looked_at
 from actuator_glue.online.playback import sample_beside, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Contradicted, Event
@@ -98,7 +99,7 @@ class _Loop:
         self.estimator = Estimator(settings, choose_model(), carried=carried)
         self.collector = Collector(KEPT)
         self._settings, self._seed = settings, seed
-        self._state, self._memory = live.init(wanted), live.Memory()
+        self._state, self._memory = live.init(wanted), Memory()
         self._remembered = Remembered()
         self._memory.setup(settings, carried)
         self._waiting: list[tuple[float, live.Concluded]] = []
@@ -164,7 +165,7 @@ class _Loop:
                 out.said.append((now, action.message))
 
     def _look(self, since: float) -> live.Concluded:
-        records, known = live.looked_at(self.collector, self._memory, since)
+        records, known = looked_at(self.collector, self._memory, since)
         began = time.process_time()
         found = diagnose(
             records,
