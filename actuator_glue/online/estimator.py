@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,10 +12,12 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import structures
+from actuator_glue.online.ahead import Ahead
 from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Knowledge
+from actuator_glue.online.schedule import Begun, ReplayPosition, Schedule
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
     Contradicted,
@@ -31,7 +33,7 @@ from actuator_glue.online.stream import (
 from actuator_glue.online.structures import Proposal
 from actuator_glue.online.window_posterior import MOST_PATIENCE, Job, WindowFit
 from actuator_glue.online.windows import SlidingWindows, Tally
-from actuator_glue.records import MAX_DISPLACEMENT, Array
+from actuator_glue.records import Array
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
@@ -44,63 +46,6 @@ _CALMER = 0.8
 # A less likely structure is sampled anew after this share of a window's length: sooner, hardly any
 # samples are new.
 NEWS = 0.1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Begun:
-    """Where a window of a live run began: where the one before it ended.
-
-    Attributes:
-        number: of the window before.
-        archive: points that it ended with, shape (m, p); None where they were not kept.
-        whole: all of these points are there.
-    """
-
-    number: int
-    archive: Array | None
-    whole: bool
-
-
-@dataclass(slots=True)
-class ReplayPosition:
-    """Whether a replay is in the live run's state, window after window.
-
-    Attributes:
-        exact: it is in that state, to the bit.
-    """
-
-    exact: bool = True
-    _last: int | None = None
-
-    def resumes(self, begun: Begun | None) -> bool:
-        """Return whether a window must start from recorded points, not from the replay's own."""
-        if begun is None or (self.exact and begun.number == self._last):
-            return False
-        resumes = begun.archive is not None
-        self.exact = resumes and begun.whole
-        return resumes
-
-    def done(self, number: int) -> None:
-        """Note the window that was computed last."""
-        self._last = number
-
-
-@dataclass(frozen=True, slots=True)
-class Schedule:
-    """What a live run did, for a replay to repeat it.
-
-    Attributes:
-        done: number of each window that gave a posterior, and evaluations of each structure, by
-            the running index and the acquisition time [ns] of its first sample; all others were
-            dropped.
-        models: what is carried from each window number on, ascending.
-        begun: where each window began, by its number, for those whose predecessor cannot be
-            computed again.
-    """
-
-    done: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]]
-    models: tuple[tuple[int, ModelChoice | Proposal], ...] = ()
-    begun: Mapping[int, Begun] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -626,47 +571,3 @@ def _box(model: ModelChoice) -> dict[str, tuple[float, float]]:
 
 def _key(window: Window) -> tuple[int, int]:
     return window.record.first_index, window.record.start_ns
-
-
-class Ahead:
-    """Commands that are known before they are acted on; bounded."""
-
-    def __init__(self, limit: int = 1_000_000) -> None:
-        self._limit = limit
-        self._start = 0
-        self._period = 0.0
-        self._command: Array = np.empty(0)
-
-    def take(self, preview: Preview) -> None:
-        """Join a preview to what is known; one that does not join replaces it.
-
-        Raises:
-            InputError: NaN, absurd values, or far too many samples.
-        """
-        command = np.asarray(preview.command, dtype=np.float64)
-        where = f'command preview at sample {preview.index}'
-        if not len(command) or len(command) > self._limit:
-            raise InputError(f'{where}: {len(command)} samples; 1 to {self._limit} can be used')
-        if not np.abs(command).max() <= MAX_DISPLACEMENT:
-            raise InputError(f'{where}: NaN, or a displacement beyond {MAX_DISPLACEMENT:g} m')
-        stop = self._start + len(self._command)
-        if preview.period == self._period and self._start <= preview.index <= stop:
-            command = np.concatenate([self._command[: preview.index - self._start], command])
-            self._command = command[-self._limit :]
-            self._start += len(command) - len(self._command)
-        else:
-            self._start, self._period, self._command = preview.index, preview.period, command
-
-    def forget(self, index: int) -> None:
-        """Forget commands before a sample."""
-        gone = min(max(0, index - self._start), len(self._command))
-        self._command = self._command[gone:]
-        self._start += gone
-
-    def between(self, start: int, stop: int, period: float) -> Array | None:
-        """Return the commands of samples start:stop; None where not all of them are known."""
-        if self._period == 0.0 or abs(period / self._period - 1.0) > 1e-4:
-            return None
-        if not self._start <= start <= stop <= self._start + len(self._command):
-            return None
-        return self._command[start - self._start : stop - self._start]

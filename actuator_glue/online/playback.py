@@ -9,8 +9,9 @@ from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
-from actuator_glue.online.estimator import Estimator, Schedule
+from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, fit, renew, report
+from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Event, Failed, Preview, Rejected
 from actuator_glue.online.structures import Proposal

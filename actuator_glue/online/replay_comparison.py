@@ -14,8 +14,8 @@ import numpy as np
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Begun, ReplayPosition, Schedule
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.schedule import Begun, ReplayPosition, Schedule
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import Proposal
 from actuator_glue.online.window_posterior import ARCHIVE, joined

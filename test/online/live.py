@@ -6,10 +6,11 @@ from online_streams import SETTINGS
 
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Estimator, Schedule
+from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
 from actuator_glue.online.replay_comparison import differences
+from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.stream import Preview
 from actuator_glue.setups import StreamSetup
 

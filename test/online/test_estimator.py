@@ -10,7 +10,7 @@ from online_streams import RATE, SETTINGS, THETA, record
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Ahead
+from actuator_glue.online.ahead import Ahead
 from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.replay_comparison import differences
 from actuator_glue.online.stream import Dropped, Failed, Preview

@@ -13,9 +13,10 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Estimator, Schedule
+from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
+from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Contradicted
 from actuator_glue.records import Record

@@ -7,9 +7,10 @@ from live import results, same
 from online_streams import SETTINGS, record
 
 from actuator_glue.inference.choice import choose_model
-from actuator_glue.online.estimator import Estimator, Schedule
+from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import stream
+from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.stream import Dropped, Preview
 from actuator_glue.setups import StreamSetup
 

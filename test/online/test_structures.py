@@ -19,11 +19,12 @@ from actuator_glue.model.commands import noise
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Estimator, Schedule
+from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, renew, run
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.playback import give, replay, sample_beside
 from actuator_glue.online.replay_comparison import differences, published
+from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.stream import Reweighed
 from actuator_glue.online.structures import Proposal, Proposed, moved, pooled, weights
 from actuator_glue.records import Record
