@@ -55,10 +55,10 @@ class Carried:
             raise InputError('the draws of a prior are not all finite')
 
     @staticmethod
-    def thinned(names: Sequence[str], draws: Array, components: int = 1) -> Carried:
+    def thinned(names: Sequence[str], draws: Array) -> Carried:
         """Return at most `DRAWS` of the draws (m, p), spread evenly."""
         chosen = np.linspace(0, len(draws) - 1, min(DRAWS, len(draws))).astype(np.intp)
-        return Carried(tuple(names), np.ascontiguousarray(draws[chosen]), components)
+        return Carried(tuple(names), np.ascontiguousarray(draws[chosen]))
 
     @cached_property
     def key(self) -> bytes:

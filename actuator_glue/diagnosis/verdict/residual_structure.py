@@ -127,7 +127,6 @@ def residual_structure(
     settle: float,
     structure: Structure,
     theta: Array,
-    settings: Thresholds | None = None,
 ) -> ResidualStructure | None:
     """Check the residual of a model's best fit; None where a record is too short.
 
@@ -137,9 +136,8 @@ def residual_structure(
         settle: uncounted start of each record [s].
         structure: the model.
         theta: its parameters near the best fit, SI units, (p,).
-        settings: thresholds.
     """
-    settings = settings or Thresholds()
+    settings = Thresholds()
     data = _data(records, initial, settle)
     if min(int(mask.sum()) for mask in data.masks) < _FEWEST:
         return None
