@@ -43,10 +43,6 @@ class Chains:
         """Draws (m, p) of all chains after burn-in."""
         return self.kept.reshape(-1, self.draws.shape[2])
 
-    def evaluations_at(self, step: int) -> int:
-        """Likelihood evaluations made when the given step (from 0) was complete."""
-        return self.start_evaluations + (step + 1) * int(self.draws.shape[1])
-
     @cached_property
     def _diagnostics(self) -> tuple[Array, Array]:
         return rhat_and_ess(self.kept)

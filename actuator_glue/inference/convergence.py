@@ -1,4 +1,4 @@
-"""Convergence of chains: R-hat, the paper's Gelman-Rubin, effective sample size.
+"""Convergence of chains: R-hat and effective sample size.
 
 arviz shows these to users; here they are needed after every window, hundreds of times as fast.
 test/inference/test_convergence.py holds them to arviz.
@@ -16,24 +16,6 @@ from scipy.special import ndtri
 
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
-
-
-def gelman_rubin(draws: Array) -> Array:
-    """Gelman-Rubin diagnostic of each parameter from the last half of each chain.
-
-    The paper's R-hat (Gelman and Rubin 1992; Vrugt 2016, Eq. 27), threshold 1.2: with N chains
-    the variance between their means counts (N + 1)/N times.
-
-    Args:
-        draws: (steps, chains, p).
-
-    Returns:
-        (p,); nan where fewer than two draws or chains remain or nothing moves.
-    """
-    half = draws[len(draws) // 2 :]
-    chains = draws.shape[1]
-    values = np.ascontiguousarray(half.T)
-    return np.asarray(_potential_reduction(values, (chains + 1.0) / max(chains, 1)))
 
 
 def rhat(draws: Array) -> Array:
@@ -67,7 +49,7 @@ def quick_rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     split = _split(draws)
     if split is None:
         return np.full(draws.shape[2], np.nan), np.full(draws.shape[2], np.nan)
-    return np.asarray(_potential_reduction(split, 1.0)), _effective(split)
+    return np.asarray(_potential_reduction(split)), _effective(split)
 
 
 def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
@@ -84,7 +66,7 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
         bulk.reshape(values.shape),
         folded.reshape(values.shape),
     )
-    reduction = np.maximum(_potential_reduction(bulk, 1.0), _potential_reduction(folded, 1.0))
+    reduction = np.maximum(_potential_reduction(bulk), _potential_reduction(folded))
     return reduction, _effective(bulk)
 
 
@@ -169,15 +151,15 @@ def _spread(chains: Array) -> tuple[float, float, Array]:
 
 
 @njit(fastmath=False)
-def _potential_reduction(values: Array, pooled: float) -> Array:
-    """sqrt(((n - 1)/n W + pooled B/n) / W) for values (p, chains, n)."""
+def _potential_reduction(values: Array) -> Array:
+    """sqrt(((n - 1)/n W + B/n) / W) for values (p, chains, n)."""
     chains, n = values.shape[1:]
     found = np.full(len(values), np.nan)
     if n < 2 or chains < 2:
         return found
     for i in range(len(values)):
         within, between, _ = _spread(values[i])
-        found[i] = math.sqrt((n - 1) / n + pooled * between / within)
+        found[i] = math.sqrt((n - 1) / n + between / within)
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from studies.chen.convergence import evaluations_at
 from studies.chen.library import BASE, NAMES, STIFFNESS, Array, Chains
 from studies.chen.misfit import by_frequency
 from studies.chen.published import CLOSE_UPS, SHOWN
@@ -111,7 +112,7 @@ def _rhat(trace: ConvergenceTrace) -> Curve:
 
 def _chains(chains: Chains) -> Curve:
     at = np.linspace(0, len(chains.draws) - 1, min(CHAIN_ROWS, len(chains.draws))).astype(int)
-    columns: Curve = {'evaluations': np.array([float(chains.evaluations_at(g)) for g in at])}
+    columns: Curve = {'evaluations': np.array([float(evaluations_at(chains, g)) for g in at])}
     for chain in range(chains.draws.shape[1]):
         for i, p in enumerate(BASE):
             columns[f'chain {chain + 1} {p.name} [{p.unit}]'] = chains.draws[at, chain, i]

@@ -9,7 +9,6 @@ from __future__ import annotations
 from actuator_glue import Diagnosis, InputError, Record, diagnose
 from actuator_glue.inference.bands import Band, band, check_draws
 from actuator_glue.inference.chains import Chains
-from actuator_glue.inference.convergence import gelman_rubin
 from actuator_glue.inference.likelihood import Errors, GlueLikelihood
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.inference.posterior import Target, sample
@@ -50,7 +49,6 @@ __all__ = [
     'commands',
     'diagnose',
     'fit_residual',
-    'gelman_rubin',
     'linear',
     'moments',
     'predictive_draws',

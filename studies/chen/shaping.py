@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from studies.chen.convergence import evaluations_at, gelman_rubin
 from studies.chen.experiment import blocks
 from studies.chen.laboratory import AS_PUBLISHED, Laboratory, Posterior
-from studies.chen.library import Array, ExactErrors, Record, band, gelman_rubin
+from studies.chen.library import Array, ExactErrors, Record, band
 from studies.chen.published import THRESHOLD
 from studies.chen.responses import LEVEL, simulate
 from studies.chen.scores import coverage
@@ -39,7 +40,7 @@ class ConvergenceTrace:
         draws = posterior.chains.draws
         lengths = np.unique(np.geomspace(min(20, len(draws)), len(draws), points).astype(int))
         return cls(
-            np.array([posterior.chains.evaluations_at(n - 1) for n in lengths], dtype=float),
+            np.array([evaluations_at(posterior.chains, n - 1) for n in lengths], dtype=float),
             np.array([gelman_rubin(draws[:n]) for n in lengths]),
         )
 

@@ -33,7 +33,7 @@ def test_stop_and_progress() -> None:
 
     stopped = run(20_000, 12_000)
     assert 12_000 <= stopped.evaluations < 12_000 + SamplerSettings().chains
-    assert stopped.evaluations == stopped.evaluations_at(len(stopped.draws) - 1)
+    assert stopped.evaluations == stopped.start_evaluations + stopped.draws[..., 0].size
     assert seen and all(most == 20_000 for _, most in seen)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     repeated = run(stopped.evaluations, 10**9)

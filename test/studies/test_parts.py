@@ -1,4 +1,4 @@
-"""The pieces between data and report: residual, shaping factor, misfit, coverage."""
+"""The pieces between data and report: residual, convergence, shaping factor, misfit, coverage."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.likelihood import GlueLikelihood
 from actuator_glue.model import reference_problem
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
 from studies.chen import findings, misfit, shaping, table_spread
 from studies.chen.calibration import simulated_case
+from studies.chen.convergence import evaluations_at, gelman_rubin
 from studies.chen.laboratory import AddedResidual, Laboratory
 from studies.chen.published import CHOSEN, TABLE_4
 from studies.chen.words import listed, num, percent, power_of_two
@@ -98,6 +100,33 @@ def test_shaping_factor_is_scored_on_samples_that_hold_the_residual(rng_seed: in
     assert expected == pytest.approx(np.mean((lower <= noisy) & (noisy <= upper)), abs=0.022)
     assert expected == pytest.approx(norm.cdf(0.5 / 0.7) - norm.cdf(-0.3 / 0.7))
     assert shaping.expected_coverage(measured, lower, upper, 0.0) == 1.0
+
+
+def test_gelman_rubin_is_as_published(rng_seed: int) -> None:
+    """Vrugt (2016), Eqs. 26 and 27, with T twice as many draws as are used."""
+    draws = np.random.default_rng(rng_seed).standard_normal((400, 3, 5)).cumsum(axis=0)
+    half = draws[200:]
+    n = len(half)
+    within = half.var(axis=0, ddof=1).mean(axis=0)
+    between = n * half.mean(axis=0).var(axis=0, ddof=1)
+    count, total = draws.shape[1], 2 * n
+    target = (total - 2) / total * within + 2 / total * between
+    ratio = (count + 1) / count * target / within
+    expected = np.sqrt(ratio - (total - 2) / (count * total))
+    assert np.allclose(gelman_rubin(draws), expected, rtol=1e-12)
+
+
+def test_gelman_rubin_of_chains_that_are_apart_or_stuck(rng_seed: int) -> None:
+    apart = np.random.default_rng(rng_seed).standard_normal((400, 4, 5))
+    apart += np.arange(4)[:, None] * 5.0
+    assert (gelman_rubin(apart) > 1.2).all()
+    for nothing in (apart[:, :1], apart[:2], np.ones((100, 4, 1))):
+        assert np.isnan(gelman_rubin(nothing)).all()
+
+
+def test_evaluations_of_a_step_are_those_of_all_chains_and_the_start() -> None:
+    chains = Chains(np.zeros((5, 3, 1)), np.zeros((5, 3)), 25, 10, 1)
+    assert [evaluations_at(chains, step) for step in (0, 4)] == [13, 25]
 
 
 def test_trace_says_when_r_hat_stays_below() -> None:

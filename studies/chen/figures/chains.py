@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from actuator_glue.report import style
+from studies.chen.convergence import evaluations_at
 from studies.chen.figures.look import (
     COLOURS,
     DASHES,
@@ -28,7 +29,7 @@ def chains(results: Results) -> Figure:
     panels = figure.subplots(4, 3, sharey='row', sharex='col')
     for column, (name, entry) in enumerate(results.shown('matched').items()):
         run = entry.published.chains
-        at = [run.evaluations_at(g) for g in range(len(run.draws))]
+        at = [evaluations_at(run, g) for g in range(len(run.draws))]
         for row, parameter in enumerate(BASE):
             axes = panels[row, column]
             for chain in range(run.draws.shape[1]):
