@@ -10,7 +10,7 @@ import numpy as np
 from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
-from actuator_glue.hygiene import impulse_removal as despike
+from actuator_glue.hygiene import impulse_removal
 from actuator_glue.hygiene import slow_channel
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.clean import clean, initial_state
@@ -53,8 +53,8 @@ class Prepared:
     def told(self) -> tuple[str, ...]:
         """What was done to the records, impulses first, for people."""
         return (
-            *despike.told(self.fit.records, self.impulses),
-            *despike.told(self.held.records, self.held_impulses),
+            *impulse_removal.told(self.fit.records, self.impulses),
+            *impulse_removal.told(self.held.records, self.held_impulses),
             *self.notes,
         )
 
@@ -63,11 +63,11 @@ class Prepared:
 
         Samples that were impulses only by another model are restored.
         """
-        fit, found = despike.without_impulses(self.fit, model, theta, self.impulses)
+        fit, found = impulse_removal.without_impulses(self.fit, model, theta, self.impulses)
         if self.folded:
             held, others = replace(fit, masks=self.held.masks), self.held_impulses
         else:
-            held, others = despike.without_impulses(self.held, model, theta, self.held_impulses)
+            held, others = impulse_removal.without_impulses(self.held, model, theta, self.held_impulses)
         if fit is self.fit and (self.folded or held is self.held):
             return self
         return replace(self, fit=fit, held=held, impulses=found, held_impulses=others)
@@ -154,12 +154,12 @@ def prepare(
 
 
 def _mended(prepared: Prepared) -> Prepared:
-    model, theta = Structure(()), despike.trimmed(prepared.fit)
-    fit, notes = despike.without_frozen(prepared.fit, model, theta)
+    model, theta = Structure(()), impulse_removal.trimmed(prepared.fit)
+    fit, notes = impulse_removal.without_frozen(prepared.fit, model, theta)
     if prepared.folded:
         held = replace(prepared.held, records=fit.records)
     else:
-        held, told = despike.without_frozen(prepared.held, model, theta)
+        held, told = impulse_removal.without_frozen(prepared.held, model, theta)
         notes += told
     prepared = replace(prepared, fit=fit, held=held, notes=(*notes, *prepared.notes))
     return prepared.without_impulses(model, theta)
