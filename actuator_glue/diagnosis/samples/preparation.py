@@ -10,8 +10,7 @@ import numpy as np
 from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
-from actuator_glue.hygiene import impulse_removal
-from actuator_glue.hygiene import slow_channel
+from actuator_glue.hygiene import impulse_removal, slow_channel
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.impulses import NONE, Impulses
@@ -67,7 +66,9 @@ class Prepared:
         if self.folded:
             held, others = replace(fit, masks=self.held.masks), self.held_impulses
         else:
-            held, others = impulse_removal.without_impulses(self.held, model, theta, self.held_impulses)
+            held, others = impulse_removal.without_impulses(
+                self.held, model, theta, self.held_impulses
+            )
         if fit is self.fit and (self.folded or held is self.held):
             return self
         return replace(self, fit=fit, held=held, impulses=found, held_impulses=others)
