@@ -51,7 +51,7 @@ QUESTIONS = (
     ('a structure is weighed', 'diagnosis/score/weights.py'),
     ('all structures stand that were refitted', 'diagnosis/search/table.py'),
     ('a tie is told', 'diagnosis/search/ties.py'),
-    ('the verdict is reached', 'diagnosis/verdict/verdict.py'),
+    ('the verdict is reached', 'diagnosis/verdict/rules.py'),
     ('the headline is written', 'diagnosis/telling/headline.py'),
     ('a window becomes a posterior', 'online/window_posterior.py'),
     (

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from actuator_glue.api.judgement import APART
 from actuator_glue.diagnosis.telling.result import DiagnosisData
-from actuator_glue.diagnosis.verdict.verdict import excused
+from actuator_glue.diagnosis.verdict.rules import excused
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.records import Record
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.api.diagnosis import Diagnosis
 from actuator_glue.diagnosis.finding import Finding
-from actuator_glue.diagnosis.verdict.verdict import against
+from actuator_glue.diagnosis.verdict.rules import against
 from actuator_glue.inference.carried import FEWEST, Carried, Drift
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.prior_use import GivenPrior

@@ -81,8 +81,8 @@ def diagnose(
         # The search starts with the likelier hold and decides between both at its end.
         ready, other = ready.with_hold('linear', replace(other, taken=True)), None
     # The error of a wrong set-up is not the actuator's: it is not searched for effects.
-    search = as_given if other is not None and other.enough else conclude
-    result = search(ready, settings, each, tell, effort)
+    reach = as_given if other is not None and other.enough else conclude
+    result = reach(ready, settings, each, tell, effort)
     drawn = sampled(result, settings, np.random.default_rng([seed, 1]), each, tell)
     tell('held-out', 0.0)
     both = both_parts.of(drawn, other, seed, each)

@@ -8,10 +8,11 @@ from typing import NamedTuple
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.moves.registry import ACROSS, WITHIN
 from actuator_glue.diagnosis.refits.candidates import mean_effects
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples import final_impulses
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.search import undetermined_motion
@@ -28,7 +29,7 @@ class _Begun(NamedTuple):
     """Records, the search of their samples that count, and hum that was removed from them."""
 
     prepared: Prepared
-    search: Search
+    refits: Refits
     line: Line | None
 
 
@@ -49,7 +50,8 @@ def conclude(
         return _within(other, asking, each, effort.extended(), fixed=True)
 
     asking = Asking(settings, tell, again)
-    return follow(_within(prepared, asking, each, effort), ACROSS, asking)
+    named = _within(prepared, asking, each, effort)
+    return follow(named, (*LEARNED_TERMS, *ACROSS), asking)
 
 
 def as_given(
@@ -57,8 +59,8 @@ def as_given(
 ) -> Conclusion:
     """Conclude from Eq. (2), alone and with each single effect, without any further search."""
     tell('base fit', 0.0)
-    prepared, search, line = _begun(prepared, settings, each, effort, fixed=True)
-    return searched(prepared, search, line, replace(settings, most=0), tell)
+    prepared, refits, line = _begun(prepared, settings, each, effort, fixed=True)
+    return searched(prepared, refits, line, replace(settings, most=0), tell)
 
 
 def _within(
@@ -87,34 +89,34 @@ def _judged_again(begun: _Begun, result: Conclusion, asking: Asking) -> tuple[_B
     taken = prepared.fit.target - clean.fit.target
     if clean is prepared or not final_impulses.swayed(final.fit, result.scorer, taken):
         return begun, result
-    search = begun.search
-    begun = _begun(clean, asking.settings, search.each, search.effort, fixed=True)
+    refits = begun.refits
+    begun = _begun(clean, asking.settings, refits.each, refits.effort, fixed=True)
     return begun, _named(begun, asking, result)
 
 
 def _begun(
     prepared: Prepared, settings: Thresholds, each: Each, effort: Effort, fixed: bool
 ) -> _Begun:
-    search = Search(prepared.fit, mean_effects(), each, effort=effort)
-    line = hum.find(prepared.fit, search.base().error)
+    refits = Refits(prepared.fit, mean_effects(), each, effort=effort)
+    line = hum.find(prepared.fit, refits.base().error)
     if line is not None:
         data = hum.without(prepared.fit, line)
-        search = Search(data, mean_effects(), each, effort=effort)
-    return _Begun(*undetermined_motion.without(prepared, search, settings, fixed), line)
+        refits = Refits(data, mean_effects(), each, effort=effort)
+    return _Begun(*undetermined_motion.without(prepared, refits, settings, fixed), line)
 
 
 def _named(begun: _Begun, asking: Asking, before: Conclusion | None = None) -> Conclusion:
     """Search for names, from those found `before` if given; hum is judged again in the end."""
-    (prepared, search, line), settings, tell = begun, asking.settings, asking.tell
-    result = searched(prepared, search, line, settings, tell, before)
+    (prepared, refits, line), settings, tell = begun, asking.settings, asking.tell
+    result = searched(prepared, refits, line, settings, tell, before)
     if line is None or not result.found.final.effects:
         return result
     left = _line_left(prepared.fit, result.found.final)
     if left is not None and left.same_as(line):
         return result
     data = prepared.fit if left is None else hum.without(prepared.fit, left)
-    search = Search(data, search.names, search.each, effort=search.effort)
-    return searched(prepared, search, left, settings, tell, result)
+    refits = Refits(data, refits.names, refits.each, effort=refits.effort)
+    return searched(prepared, refits, left, settings, tell, result)
 
 
 def _line_left(data: Data, final: Trial) -> Line | None:

@@ -73,6 +73,10 @@ TELLING: Final = 0.05
 # The same for another addition: an effect that just matters gains four nats.
 MATTERING: Final = 0.5
 
+# Nats that a description costs beyond its parameters and its choice, since a name says what to
+# mend: in the place of a name it must remove half of what matters.
+DESCRIPTION: Final = 1.0
+
 # Of what matters: two effects that remove this share each remove what matters together.
 TOGETHER: Final = 0.5**0.5
 # Of what matters: a rough refit that removes less will not become material when finished.
@@ -98,15 +102,6 @@ GROUP_ALONE: Final = 0.9
 # Names after which learned terms are tried: they may be plainer than further names.
 NAMES_FIRST: Final = 2
 MOST_TERMS: Final = 2
-# Of what matters: a description must remove so much beyond the name it replaces, since a name says
-# what to mend.
-REPLACING: Final = 0.5
-# Another shape of the same cause must remove this share of what matters, and this share of the
-# stroke, which is more than the errors of decimation and simulation steps.
-RESHAPING: Final = 0.1
-RESHAPING_STROKE: Final = 3e-4
-# Of what names remove: a description that removes less beyond them is tied.
-TERM_TIED: Final = 0.1
 # Share of the squared error that a generic regression must remove to point at a place.
 POINTING: Final = 0.3
 

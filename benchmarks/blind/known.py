@@ -46,7 +46,7 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     from actuator_glue.diagnosis.posterior.discrepancy import beside, responses
     from actuator_glue.diagnosis.posterior.ridge import left_open
     from actuator_glue.diagnosis.refits.candidates import mean_effects
-    from actuator_glue.diagnosis.refits.structures import Search
+    from actuator_glue.diagnosis.refits.refits import Refits
     from actuator_glue.diagnosis.samples.preparation import prepare
     from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
     from actuator_glue.diagnosis.thresholds import Thresholds
@@ -74,16 +74,16 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     splits = splits_of(data, found.error)
     scorer = Scorer.of(data, splits)
     scorer = replace(scorer, data=replace(data, finer=not model.linear))  # as a diagnosis does
-    search, limits = Search(data, mean_effects()), Thresholds()
-    search.base()
+    refits, limits = Refits(data, mean_effects()), Thresholds()
+    refits.base()
     material = max(
-        limits.noise_share * pooled(data, splits)[1], limits.stroke_share * search.scale().stroke
+        limits.noise_share * pooled(data, splits)[1], limits.stroke_share * refits.scale().stroke
     )
     draws = posterior.sample(
         model,
         found,
         scorer,
-        beside=beside(responses(search, material), model.effects, scorer),
+        beside=beside(responses(refits, material), model.effects, scorer),
         rng=np.random.default_rng(seed),
         evaluations=evaluations,
         progress=lambda share: None,

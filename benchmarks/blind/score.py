@@ -11,7 +11,7 @@ import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
 from actuator_glue.diagnosis.score.weights import log_weights
-from actuator_glue.diagnosis.search.table import additions
+from actuator_glue.diagnosis.search.table import kind
 from actuator_glue.diagnosis.thresholds import TELLING
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
@@ -136,12 +136,12 @@ def row_weights(rows: list[Json], material: float, telling: float = TELLING) -> 
     Args:
         rows: structures with `left_out` [m], `price` [nats], `scope` and `effects`.
         material: least rms error that matters [m].
-        telling: of that, the error that costs a nat between structures with as many additions.
+        telling: of that, the error that costs a nat between structures of a kind.
     """
     return log_weights(
         [np.inf if r['left_out'] is None else r['left_out'] for r in rows],
         [r['price'] for r in rows],
-        [additions(r['scope'], len(r['effects'])) for r in rows],
+        [kind(r['effects'], r['scope']) for r in rows],
         material,
         telling,
     )

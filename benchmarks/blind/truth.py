@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from case import Case
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
@@ -26,11 +26,11 @@ def refitted(case: Case, records: Sequence[Record]) -> float:
     if case.kind == 'unknown':
         return float('nan')
     fit, held = Data.whole(records[:2]), Data.whole(records[2:])
-    search = Search(fit, CATALOGUE.searched())
-    search.scorer = Scorer.of(fit, splits_of(fit, search.base().error))
-    trial = search.trial(())
+    refits = Refits(fit, CATALOGUE.searched())
+    refits.scorer = Scorer.of(fit, splits_of(fit, refits.base().error))
+    trial = refits.trial(())
     for name in names:
         if CATALOGUE[name].variance is None and name != 'hum':
-            trial = search.polish(search.add(trial, name))
+            trial = refits.polish(refits.add(trial, name))
     error = held.target - held.simulate(Structure(trial.effects), trial.fit.theta)[0]
     return float(np.sqrt(np.mean(error**2)))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 
@@ -33,7 +33,7 @@ def test_a_refit_that_leaves_far_less_is_finished_whatever_its_score(seed: int) 
     """Short of its optimum its score was the worst: a saturated valve went without its name."""
     finished = []
 
-    class Rough(Search):
+    class Rough(Refits):
         def add(self, current: Trial, name: str) -> Trial:
             return trial(name, *ROUGH[name])
 

@@ -14,6 +14,8 @@ from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.moves.move import AnswerMove, follow
 from actuator_glue.diagnosis.selection import SearchStep
 
+WEIGHTS = {'light': -1, 'a': 1, 'b': 2, 'c': 1, 'd': 1}
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -23,12 +25,16 @@ class Answer:
     effort: Effort = field(default_factory=Effort)
     history: tuple[SearchStep, ...] = ()
     others: tuple[str, ...] = ()
-    selection: Any = field(default_factory=lambda: SimpleNamespace(search='one for all'))
+    beam: Any = field(default_factory=lambda: SimpleNamespace(refits='one for all'))
 
     @property
     def found(self) -> tuple[str, ...]:
         """What was chosen: the same object for the same answer."""
         return self.effects
+
+    def outweighs(self, other: Answer) -> bool:
+        """Whether it has more weight."""
+        return sum(map(WEIGHTS.get, self.effects)) > sum(map(WEIGHTS.get, other.effects))
 
     @property
     def decision(self) -> Any:
@@ -62,18 +68,27 @@ def followed(*groups: tuple[Any, ...], effort: Effort | None = None) -> Any:
     return follow(start, groups, asking)
 
 
-def test_of_a_group_the_first_move_that_is_taken_ends_it() -> None:
-    told = followed((adding('a', taken=False), adding('b'), adding('c')), (adding('d'),))
-    assert told.effects == ('b', 'd')
-    assert [s.what for s in told.history] == ['Eq. (2) alone', 'add b', 'add d']
+def test_of_a_group_the_heaviest_answer_is_taken_until_none_has_more_weight() -> None:
+    told = followed((adding('a'), adding('b'), adding('light')), (adding('c', taken=False),))
+    assert told.effects == ('b', 'a')
+    assert [s.what for s in told.history] == ['Eq. (2) alone', 'add b', 'add a']
     assert [s.parameters for s in told.history] == [4, 5, 6]
 
 
+def test_groups_are_tried_in_their_order() -> None:
+    assert followed((adding('a'),), (adding('b'),)).effects == ('a', 'b')
+
+
 def test_what_an_answer_was_held_against_stays_in_the_table() -> None:
-    """No move was taken, so the next of the group is asked for, and no step is told."""
-    told = followed((holding_against('a'), adding('b')), (adding('c'),))
-    assert told.effects == ('b', 'c') and len(told.history) == 3
-    assert told.others == ('a',)
+    """No move was taken, so no step is told."""
+    told = followed((holding_against('a'),))
+    assert told.effects == () and len(told.history) == 1
+    assert 'a' in told.others
+
+
+def test_an_answer_of_less_weight_is_not_taken() -> None:
+    told = followed((adding('light'),), (adding('b'),))
+    assert told.effects == ('b',) and len(told.history) == 2
 
 
 def test_what_is_not_asked_for_is_not_taken() -> None:

@@ -1,21 +1,18 @@
 """What decides between structures: noise under stationary commands, forms held by a bound."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import signal
-from trials import THETA, entries, trial
+from trials import THETA
 
-from actuator_glue.diagnosis.moves import learned_terms
 from actuator_glue.diagnosis.refits.candidates import mean_effects
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
-from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -40,30 +37,30 @@ def stationary(
     return Data.whole(records)
 
 
-def selection(data: Data) -> BeamSearch:
+def beam(data: Data) -> BeamSearch:
     """The first step of a selection: Eq. (2) fitted, noise taken from what it leaves."""
-    found = BeamSearch(Search(data, mean_effects()), Thresholds(), lambda stage, share: None)
+    found = BeamSearch(Refits(data, mean_effects()), Thresholds(), lambda stage, share: None)
     found.renoise()
     return found
 
 
 def test_structure_under_a_stationary_command_is_no_noise() -> None:
     """40 um of play: all of its error looks stationary, a forecast of left-out blocks does not."""
-    found = selection(stationary(('backlash',), [4e-5], 1))
-    error = found.search.base().error
-    looks = pooled(found.search.data, splits_of(found.search.data, error))[1]
+    found = beam(stationary(('backlash',), [4e-5], 1))
+    error = found.refits.base().error
+    looks = pooled(found.refits.data, splits_of(found.refits.data, error))[1]
     assert looks > 1.5e-5
     assert 0.97e-5 < found.noise < 0.75 * looks
-    left = found.left(found.search.trial(()))
+    left = found.left(found.refits.trial(()))
     assert np.hypot(left, found.noise) == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-6)
     assert left > found.material
 
 
 def test_noise_under_a_stationary_command_stays_noise() -> None:
     """A healthy machine: nothing can be forecast beyond chance."""
-    found = selection(stationary((), [], 2))
+    found = beam(stationary((), [], 2))
     assert found.noise == pytest.approx(1e-5, rel=0.05)
-    assert found.left(found.search.trial(())) < 0.3 * found.noise
+    assert found.left(found.refits.trial(())) < 0.3 * found.noise
 
 
 def test_a_transducer_may_bend_by_a_tenth_of_a_short_stroke() -> None:
@@ -73,58 +70,17 @@ def test_a_transducer_may_bend_by_a_tenth_of_a_short_stroke() -> None:
     bent = Structure(('sensor-curve',))
     y = bent.simulate(np.append(THETA, [75.0, 0.0]), Record(u, u, 1 / RATE, 0.0))
     y += 1e-5 * np.random.default_rng(3).standard_normal(len(u))
-    found = selection(Data.whole([Record(u, y, 1 / RATE, stiffness=0.0)]))
-    trial = found.search.polish(found.search.add(found.search.trial(()), 'sensor-curve'))
+    found = beam(Data.whole([Record(u, y, 1 / RATE, stiffness=0.0)]))
+    trial = found.refits.polish(found.refits.add(found.refits.trial(()), 'sensor-curve'))
     assert trial.fit.theta[4] == pytest.approx(75.0, rel=0.02)
     assert trial.fit.rms < 1.05e-5
-
-
-@dataclass
-class Displaced:
-    """A selection whose term makes the name beside it worthless."""
-
-    left_by_term: float
-    material: float = 2e-6
-    settings: Thresholds = field(default_factory=Thresholds)
-    search: 'Displaced' = field(init=False)
-    entries: dict[str, Effect] = field(default_factory=entries)
-
-    def __post_init__(self) -> None:
-        """Search and selection are one here."""
-        self.search = self
-
-    def pruned(self, both: Trial) -> Trial:
-        """Return the structure without the name."""
-        return trial(('learned-valve-e2',), self.left_by_term)
-
-    def left(self, structure: Trial) -> float:
-        """Return the rms structure that remains."""
-        return structure.fit.rms
-
-    def without(self, structure: Trial, name: str) -> Trial:
-        """Return Eq. (2) alone."""
-        return trial((), 30e-6)
-
-
-@pytest.mark.parametrize(
-    ('named', 'term', 'displaces'),
-    [(8.2e-6, 8e-6, True), (9e-6, 8e-6, False), (9e-6, 1e-6, False), (14e-6, 8e-6, False)],
-)
-def test_a_term_takes_no_place_of_what_has_a_name(
-    named: float, term: float, displaces: bool
-) -> None:
-    """Unless nothing material is left then, or the name leaves materially more (2 um here)."""
-    best = trial(('flow-asymmetry',), named)
-    both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
-    found = Displaced(term)
-    assert learned_terms._displaces(found, both, best) is displaces
 
 
 @pytest.mark.parametrize('seed', [1, 2])
 def test_structure_under_a_shaking_that_fades_is_no_noise(seed: int) -> None:
     """A dead zone of 30 um: the motion is told from noise, what it leaves is not (18.8 um)."""
-    found = selection(stationary(('valve-deadband',), [3e-5], seed, fading=0.08))
-    data, error = found.search.data, found.search.base().error
+    found = beam(stationary(('valve-deadband',), [3e-5], seed, fading=0.08))
+    data, error = found.refits.data, found.refits.base().error
     structure, noise = pooled(data, splits_of(data, data.target))
     assert noise**2 < 0.3 * (structure**2 + noise**2)
     assert pooled(data, splits_of(data, error))[1] > 1.8e-5
@@ -134,8 +90,8 @@ def test_structure_under_a_shaking_that_fades_is_no_noise(seed: int) -> None:
 @pytest.mark.parametrize(('size', 'alike'), [(3e-7, True), (2e-5, False)])
 def test_what_leaves_structure_takes_no_place_of_a_whole(size: float, alike: bool) -> None:
     """A hundred nats of noise, beside slow structure that matters or does not."""
-    found = selection(stationary((), [], 3))
-    base, noise = found.search.trial(()), found.search.base().error
+    found = beam(stationary((), [], 3))
+    base, noise = found.refits.trial(()), found.refits.base().error
     at = np.arange(len(noise)) / RATE
     slow = np.sin(2 * np.pi * 0.3 * at) * np.sin(np.pi * at / 80) ** 2
     left = noise + size / slow.std() * slow
@@ -145,8 +101,8 @@ def test_what_leaves_structure_takes_no_place_of_a_whole(size: float, alike: boo
 
 def test_all_that_remains_may_count_as_noise() -> None:
     """Play of 40 um under a stationary command: what is left has unit variance then."""
-    found = selection(stationary(('backlash',), [4e-5], 4))
-    data, error = found.search.data, found.search.base().error
+    found = beam(stationary(('backlash',), [4e-5], 4))
+    data, error = found.refits.data, found.refits.base().error
     error = error * (1.0 + np.arange(len(error)) / len(error)) ** 4  # it grows: structure
     splits = splits_of(data, error)
     sizes = [
@@ -177,14 +133,14 @@ def payload_beside_a_skewed_clock(seed: int) -> Data:
 @pytest.mark.slow
 def test_what_was_not_tried_is_screened_beside_the_members(rng_seed: int) -> None:
     """Damping is tried, which with Eq. (2) alone looks like others; nothing is tried again."""
-    found = selection(payload_beside_a_skewed_clock(rng_seed))
-    search = found.search
-    current = search.trial(())
+    found = beam(payload_beside_a_skewed_clock(rng_seed))
+    refits = found.refits
+    current = refits.trial(())
     for name in ('coulomb-friction', 'clock-skew'):
-        current = search.add(current, name)
-    found.renoise(search.finished(current))
-    current, most = search.trial(current.effects), found.settings.tried
-    alone = search.screened(current, set(search.names) - set(current.effects))[:most]
+        current = refits.add(current, name)
+    found.renoise(refits.finished(current))
+    current, most = refits.trial(current.effects), found.settings.tried
+    alone = refits.screened(current, set(refits.names) - set(current.effects))[:most]
     tried = {t.added for t in found.overlooked(current)}
     assert len(tried) == most
     assert 'viscous-damping' in tried - set(alone)
@@ -193,7 +149,7 @@ def test_what_was_not_tried_is_screened_beside_the_members(rng_seed: int) -> Non
 
 def test_the_nearest_structure_gives_the_noise() -> None:
     """By the error it leaves out of sample, not by nats: those may be of misfit alone."""
-    found = selection(stationary(('gain',), [1.05], 41))
-    search = found.search
-    trials = [search.add(search.trial(()), name) for name in ('bias', 'gain', 'drift')]
+    found = beam(stationary(('gain',), [1.05], 41))
+    refits = found.refits
+    trials = [refits.add(refits.trial(()), name) for name in ('bias', 'gain', 'drift')]
     assert found._nearest(trials).added == 'gain'

@@ -36,11 +36,11 @@ def without_gap() -> list[tuple[BeamSearch, Selection]]:
     return [selected(0.0, seed) for seed in range(4)]
 
 
-def sampled(selection: BeamSearch, found: Selection, trial: Trial) -> Draws:
+def sampled(beam: BeamSearch, found: Selection, trial: Trial) -> Draws:
     """Normal approximation of a structure's posterior."""
-    scorer = selection.search.scorer
+    scorer = beam.refits.scorer
     assert scorer is not None
-    small = discrepancy.responses(selection.search, found.material)
+    small = discrepancy.responses(beam.refits, found.material)
     return posterior.sample(
         trial.structure,
         trial.fit,
@@ -54,19 +54,19 @@ def sampled(selection: BeamSearch, found: Selection, trial: Trial) -> Draws:
 
 def test_what_does_not_matter_is_held_beside() -> None:
     """A gap that removes less than half of the noise: not told, and the damping is right."""
-    selection, found = selected(GAP)
+    beam, found = selected(GAP)
     assert found.final.effects == ('viscous-damping',)
-    larger = companions.with_companions(selection, found.final)
+    larger = companions.with_companions(beam, found.final)
     assert larger.effects == ('viscous-damping', 'specimen-gap')
     draws = answer_posterior.reduced(
-        sampled(selection, found, larger), larger, found.final, [True] * 4 + [False]
+        sampled(beam, found, larger), larger, found.final, [True] * 4 + [False]
     )
     assert draws.unmet == (False, False, False, False, True)  # what is open stays open
     assert draws.points.shape[1] == 5
     # Five standard deviations of the estimate: fails by chance once in 10^6.
     low, high = np.quantile(draws.points[:, 4], [0.025, 0.975])
     assert abs(0.5 * (low + high) - DAMPING) < 5.0 * (high - low) / 3.92
-    held = selection.search.data  # what it leaves there is known
+    held = beam.refits.data  # what it leaves there is known
     (sentence,) = companion_notes.sentences(found.final, larger, held, missed=False)
     assert sentence.startswith('specimen-gap may be there, too')
     assert sentence.endswith('less than what matters; intervals allow for it')
@@ -84,15 +84,15 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
     names = ('delay', 'valve-lag', 'sensor-lag', 'viscous-damping', 'bias', 'drift')
     u = two_sweeps.sweep(2e-3, 10.0, 40.0)
     tests = two_sweeps.motions({'sensor-lag': 1e-3}, two_sweeps.THETA, u, (100e3, 400e3))
-    selection, found = two_sweeps.selected_of(names, tests, rng_seed)
+    beam, found = two_sweeps.selected_of(names, tests, rng_seed)
     assert not found.final.effects
-    larger = companions.with_companions(selection, found.final)
+    larger = companions.with_companions(beam, found.final)
     assert set(larger.effects) & set(names[:3])
-    like = companions.alike(selection, found.final, larger)
+    like = companions.alike(beam, found.final, larger)
     assert {e for trial, _ in like for e in trial.effects} | set(larger.effects) == set(names[:3])
 
     def draws(trial: Trial) -> np.ndarray:
-        return sampled(selection, found, trial).points
+        return sampled(beam, found, trial).points
 
     rng = np.random.default_rng(rng_seed)
     alone = mixed_draws.MixedDraws.of(draws(larger), larger.effects)
@@ -104,17 +104,17 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
     # Five standard deviations of the estimate: fails by chance once in 10^6.
     assert abs(beside[1] - true) < 5.0 * (beside[2] - beside[0]) / 3.92
     assert without[2] < 0.93 * true
-    held = selection.search.data
+    held = beam.refits.data
     (sentence,) = companion_notes.sentences(found.final, larger, held, missed=False)
     assert sentence.startswith(f'{larger.effects[-1]} (or what is like it) may be there, too')
 
 
 def test_what_removes_what_matters_is_added() -> None:
     """Though the rest passed for noise: where 1 um mattered the gap's 1.7 um would."""
-    selection, found = selected(GAP)
-    assert that_matter(selection, found) is None
-    selection.material = 1e-6
-    larger = that_matter(selection, found)
+    beam, found = selected(GAP)
+    assert that_matter(beam, found) is None
+    beam.material = 1e-6
+    larger = that_matter(beam, found)
     assert larger is not None
     assert larger.final.effects == ('viscous-damping', 'specimen-gap')
     assert set(larger.rivals) == set(larger.final.effects)
@@ -125,10 +125,10 @@ def test_nothing_is_held_beside_without_it(
 ) -> None:
     """At the level of false alarms, one in a hundred."""
     held = []
-    for selection, found in without_gap:
+    for beam, found in without_gap:
         assert found.final.effects == ('viscous-damping',)
-        larger = companions.with_companions(selection, found.final)
-        assert companion_notes.sentences(larger, larger, selection.search.data, True) == ()
+        larger = companions.with_companions(beam, found.final)
+        assert companion_notes.sentences(larger, larger, beam.refits.data, True) == ()
         held.append(larger is not found.final)
     assert not any(held)
 
@@ -137,9 +137,9 @@ def test_what_has_a_record_of_its_own_stands_alone(
     without_gap: list[tuple[BeamSearch, Selection]],
 ) -> None:
     """One record's setting is no effect of the catalogue's search."""
-    selection, found = without_gap[0]
+    beam, found = without_gap[0]
     own = replace(found.final, own=found.final.structure)
-    assert companions.with_companions(selection, own) is own
+    assert companions.with_companions(beam, own) is own
 
 
 def test_damping_is_found_on_either_side_of_the_valve(
@@ -164,7 +164,7 @@ def test_what_the_held_out_part_shows_is_hinted_at(rng_seed: int) -> None:
     names, small = ('viscous-damping', 'delay', 'bias', 'drift'), 2e-4
     u, theta = two_sweeps.sweep(small, 10.0, 80.0), two_sweeps.THETA
     effects, stiffness = {'viscous-damping': 3e4}, (100e3, 400e3)
-    selection, found = two_sweeps.selected_of(
+    beam, found = two_sweeps.selected_of(
         names, two_sweeps.motions(effects, theta, u, stiffness), rng_seed
     )
     assert not found.final.effects
@@ -172,8 +172,8 @@ def test_what_the_held_out_part_shows_is_hinted_at(rng_seed: int) -> None:
         Record(v, y, 1 / two_sweeps.RATE, stiffness=k)
         for k, v, y in two_sweeps.motions(effects, theta, 10.0 * u, stiffness)
     ]
-    (sentence,) = companion_notes.hint(selection, found.final, Data.whole(loud))
+    (sentence,) = companion_notes.hint(beam, found.final, Data.whole(loud))
     assert sentence.startswith('viscous-damping (or what is like it) is not added')
     left = re.findall(r'([\d.]+) um with', sentence)
     assert float(left[0]) < 0.5 * float(left[1])
-    assert companion_notes.hint(selection, found.final, selection.search.data) == ()
+    assert companion_notes.hint(beam, found.final, beam.refits.data) == ()

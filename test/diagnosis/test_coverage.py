@@ -6,7 +6,7 @@ from scipy import signal
 
 from actuator_glue.diagnosis.posterior import discrepancy, posterior
 from actuator_glue.diagnosis.refits.candidates import mean_effects
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
@@ -38,10 +38,10 @@ def test_what_is_immaterial_is_in_the_intervals() -> None:
             u = commands.sweep(RATE, 30.0, 0.1, 8.0, 2e-3)
             y = truth.simulate(theta, Record(u, 0.0 * u, 1.0 / RATE, k))
             records.append(Record(u, y + 1e-5 * rng.standard_normal(len(u)), 1.0 / RATE, k))
-        search = Search(Data.whole(records), mean_effects())
-        found = search.base()
-        scorer = Scorer.of(search.data, splits_of(search.data, found.error))
-        for hits, small in ((inside, discrepancy.responses(search, 5e-6)), (plain, {})):
+        refits = Refits(Data.whole(records), mean_effects())
+        found = refits.base()
+        scorer = Scorer.of(refits.data, splits_of(refits.data, found.error))
+        for hits, small in ((inside, discrepancy.responses(refits, 5e-6)), (plain, {})):
             draws = posterior.sample(
                 Structure(()),
                 found,

@@ -51,7 +51,7 @@ def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
     def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
         return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
 
-    monkeypatch.setattr('actuator_glue.diagnosis.refits.structures.forms', sensors)
+    monkeypatch.setattr('actuator_glue.diagnosis.refits.refits.forms', sensors)
 
 
 @pytest.mark.usefixtures('few_forms')

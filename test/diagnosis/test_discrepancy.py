@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from actuator_glue.diagnosis.posterior.discrepancy import _SCALES, Discrepancy, beside, responses
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.parameters import TABLE_2
@@ -86,9 +86,9 @@ def test_each_record_may_have_a_zero_of_its_own(rng_seed: int) -> None:
         bare = Record(2e-3 * np.sin(t**2), 0.0 * t, 1.0 / 64.0, stiffness=k)
         measured = Structure(()).simulate(TABLE_2, bare) + 1e-5 * rng.standard_normal(len(t))
         records.append(Record(bare.command, measured, bare.period, stiffness=k))
-    search = Search(Data.whole(records), ('gain',))
-    scorer = Scorer.of(search.data, splits_of(search.data, search.base().error))
-    small = responses(search, 5e-6)
+    refits = Refits(Data.whole(records), ('gain',))
+    scorer = Scorer.of(refits.data, splits_of(refits.data, refits.base().error))
+    small = responses(refits, 5e-6)
     own = np.concatenate([a + b * t for a, b in rng.standard_normal((2, 2))])
     shapes = beside(small, ('gain',), scorer)
     assert len(shapes.shapes) == 4

@@ -16,10 +16,10 @@ def test_two_take_the_place_of_a_name_that_seems_enough() -> None:
     """A slow valve and a clock that runs fast leave next to nothing as a gain that drifts."""
     effects = {'valve-lag': LAG, 'clock-skew': SKEW}
     machine = motions(effects, THETA, sweep(2e-3, 8.0, 40.0), STIFFNESSES)
-    selection, found = selected_of(NAMES, machine)
+    beam, found = selected_of(NAMES, machine)
     assert found.final.effects == ('gain-drift',)
     assert found.left < found.material
-    told = two_for_one.exchanged(selection, found)
+    told = two_for_one.exchanged(beam, found)
     assert told is not None
     assert told.final.effects == ('valve-lag', 'clock-skew')
     assert told.final.fit.theta[4:] == pytest.approx([LAG, SKEW], rel=0.1)
@@ -28,6 +28,6 @@ def test_two_take_the_place_of_a_name_that_seems_enough() -> None:
 def test_a_right_name_is_not_exchanged() -> None:
     """No two others say more than a gain that drifts where it does."""
     machine = motions({'gain-drift': 0.05}, THETA, sweep(2e-3, 8.0, 40.0), STIFFNESSES)
-    selection, found = selected_of(NAMES, machine)
+    beam, found = selected_of(NAMES, machine)
     assert found.final.effects == ('gain-drift',)
-    assert two_for_one.exchanged(selection, found) is None
+    assert two_for_one.exchanged(beam, found) is None

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.search import force_ranking
@@ -35,9 +35,9 @@ def swept(effect: str, sizes: list[float], seed: int) -> Data:
 
 def decided(data: Data, names: tuple[str, ...]) -> tuple[Selection, Selection, tuple[str, ...]]:
     """Return what the displacement says, and what both say, with the notes."""
-    search = Search(data, names)
-    found = BeamSearch(search, SETTINGS, lambda stage, share: None).run()
-    return found, *force_ranking.decided(search, found, SETTINGS)
+    refits = Refits(data, names)
+    found = BeamSearch(refits, SETTINGS, lambda stage, share: None).run()
+    return found, *force_ranking.decided(refits, found, SETTINGS)
 
 
 def test_the_force_chooses_among_tied_names(rng_seed: int) -> None:

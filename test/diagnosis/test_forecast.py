@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
@@ -33,8 +33,8 @@ def selected(
         still = Record(u, u, 1 / RATE, 250e3)
         y = Structure(effects).simulate([*THETA, *sizes], still).reshape(-1)
         records.append(replace(still, measured=y + NOISE * rng.standard_normal(n)))
-    search = Search(Data.whole(records), ('delay',))
-    found = BeamSearch(search, Thresholds(), lambda stage, share: None)
+    refits = Refits(Data.whole(records), ('delay',))
+    found = BeamSearch(refits, Thresholds(), lambda stage, share: None)
     found.renoise()
     return found
 
@@ -73,7 +73,7 @@ def test_the_gain_of_one_record_is_no_noise(rng_seed: int) -> None:
         noise = NOISE * np.random.default_rng((rng_seed, i)).standard_normal(len(u))
         records.append(replace(still, measured=y + noise))
     found = BeamSearch(
-        Search(Data.whole(records), ('delay',)), Thresholds(), lambda stage, share: None
+        Refits(Data.whole(records), ('delay',)), Thresholds(), lambda stage, share: None
     )
     found.renoise()
     assert found.noise == pytest.approx(NOISE, rel=0.2)
@@ -88,7 +88,7 @@ def test_noise_is_not_forecast(rng_seed: int) -> None:
     found, rng = selected((), [], np.random.default_rng(rng_seed)), np.random.default_rng(rng_seed)
     assert found.noise == pytest.approx(NOISE, rel=0.05)
     assert found.first < found.material
-    base, data = found.search.base(), found.search.data
+    base, data = found.refits.base(), found.refits.data
     features = forecast.Features(data, base.theta)
     for pole in (0.0, 0.0, 0.9, 0.9):
         error = signal.lfilter([NOISE], [1.0, -pole], rng.standard_normal(base.error.size))
@@ -104,7 +104,7 @@ def test_a_forecast_does_not_see_what_it_forecasts(rng_seed: int) -> None:
     block is among those fitted.
     """
     found = selected((), [], np.random.default_rng(rng_seed))
-    base, data, scorer = found.search.base(), found.search.data, found.search.scorer
+    base, data, scorer = found.refits.base(), found.refits.data, found.refits.scorer
     assert scorer is not None
     block, error = scorer.blocks[5], base.error.copy()
     added = 0.1 * data.target[block][::-1]
@@ -119,7 +119,7 @@ def test_a_forecast_does_not_see_what_it_forecasts(rng_seed: int) -> None:
 def test_a_structure_that_does_not_move_takes_nothing_up(rng_seed: int) -> None:
     """A flow limit next to zero, say: no parameter moves the piston, and that is no error."""
     found = selected((), [], np.random.default_rng(rng_seed))
-    base, data, scorer = found.search.base(), found.search.data, found.search.scorer
+    base, data, scorer = found.refits.base(), found.refits.data, found.refits.scorer
     assert scorer is not None
     still = replace(base, slopes=np.zeros_like(base.slopes))
     scores, left = forecast.left_out(forecast.Features(data, base.theta), scorer, still)

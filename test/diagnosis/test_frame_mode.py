@@ -7,7 +7,7 @@ import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.refits.candidates import mean_effects
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
@@ -35,7 +35,7 @@ def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> 
     noise = NOISE * np.random.default_rng(rng_seed).standard_normal(len(T))
     data = Data.whole([replace(still, measured=moved + noise)])
     names = 'frame-mode', 'payload-inertia', 'delay', 'valve-lag', 'backlash'
-    found = BeamSearch(Search(data, names), Thresholds(), lambda stage, share: None).run()
+    found = BeamSearch(Refits(data, names), Thresholds(), lambda stage, share: None).run()
     assert found.final.effects == (effect,)
     assert found.final.fit.rms < 1.1 * NOISE
     assert [r.name for r in found.rivals[effect] if r.tied and len(r.effects) == 1] == [effect]
@@ -43,7 +43,7 @@ def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> 
 
 @pytest.mark.slow
 def test_a_mode_is_tried_where_all_other_effects_leave_something(rng_seed: int) -> None:
-    """And stays; what rings on in the residual of Eq. (2) is not taken for hum. 60 runs of 60."""
+    """And stays; what rings on in the residual of Eq. (2) is not taken for hum."""
     assert 'frame-mode' not in mean_effects()
     rng = np.random.default_rng(rng_seed)
     sizes = [4e-7, rng.uniform(6.0, 9.0), 0.03, 0.0]

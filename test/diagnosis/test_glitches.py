@@ -149,7 +149,7 @@ def test_a_valve_that_remembers_is_not_pushed(rng_seed: int) -> None:
         y = y + off + NOISE * rng.standard_normal(len(u))
         records.append(Record(u + off, y, 1.0 / RATE, stiffness=k))
     prepared = prepare(records[:1], records[1:])
-    assert sum('did not move the piston' in note for note in prepared.told) == 2
+    assert sum('did not move the piston' in note for note in prepared.remarks) == 2
     for raw, clean in zip(records, (*prepared.fit.records, *prepared.held.records), strict=True):
         before, after = (
             np.std(r.measured - valve.simulate(theta, r, initial='rest')) for r in (raw, clean)

@@ -5,7 +5,7 @@ import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.refits import global_search
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
@@ -35,7 +35,7 @@ def held_up(seed: int, stiffnesses: tuple[float, ...] = (0.0, 250e3)) -> list[Re
 
 def slopes_alone(data: Data) -> Fit:
     """What Gauss and Newton find from the usual starts."""
-    base = Search(data, ()).base()
+    base = Refits(data, ()).base()
     starts = COULOMB.starts(base.theta, scale(data.records, base.theta))
     return fit(data, COULOMB, starts, iterations=8)
 
@@ -128,7 +128,7 @@ def test_a_lag_does_not_change_places_with_the_valve() -> None:
         measured = model.simulate(theta, Record(command, command, 1 / RATE, stiffness=k))
         measured += 1e-5 * rng.standard_normal(len(command))
         records.append(Record(command, measured, 1 / RATE, stiffness=k))
-    search = Search(Data.whole(records), ('sensor-lag',))
-    search.scorer = Scorer.of(search.data, splits_of(search.data, search.base().error))
-    found = search.polish(search.add(search.trial(()), 'sensor-lag')).fit
+    refits = Refits(Data.whole(records), ('sensor-lag',))
+    refits.scorer = Scorer.of(refits.data, splits_of(refits.data, refits.base().error))
+    found = refits.polish(refits.add(refits.trial(()), 'sensor-lag')).fit
     assert found.theta[[0, 4]] == pytest.approx(theta[[0, 4]], rel=0.03)

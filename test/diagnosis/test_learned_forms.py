@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.learned.forms import forms
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -27,12 +27,12 @@ LIMITS: dict[str, Callable[[Array], Array]] = {
 
 def refitted(records: list[Record], place: str) -> tuple[float, list[Trial]]:
     """Return what Eq. (2) leaves [m], and structures with each form of a place."""
-    search = Search(Data.whole(records), ())
-    base = search.base()
-    search.scorer = Scorer.of(search.data, splits_of(search.data, base.error))
-    offered = [e for e in forms(search.scale()) if e.place == place]
-    search.entries |= {e.name: e for e in offered}
-    return base.rms, search.additions(search.trial(()), [e.name for e in offered])
+    refits = Refits(Data.whole(records), ())
+    base = refits.base()
+    refits.scorer = Scorer.of(refits.data, splits_of(refits.data, base.error))
+    offered = [e for e in forms(refits.scale()) if e.place == place]
+    refits.entries |= {e.name: e for e in offered}
+    return base.rms, refits.additions(refits.trial(()), [e.name for e in offered])
 
 
 @pytest.mark.parametrize('name', LIMITS)

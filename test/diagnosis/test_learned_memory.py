@@ -8,8 +8,7 @@ from smooth_machines import piston
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import described
-from actuator_glue.diagnosis.moves.learned_terms import _plainer
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -50,21 +49,21 @@ def sweeps(kind: int, size: float, theta: Array, rng: np.random.Generator) -> li
     return out
 
 
-def searched(records: list[Record]) -> tuple[Search, list[str]]:
+def searched(records: list[Record]) -> tuple[Refits, list[str]]:
     """What a diagnosis knows after Eq. (2), and the names of the forms that it learns from."""
-    search = Search(Data.whole(records), ())
-    base = search.base()
-    search.scorer = Scorer.of(search.data, splits_of(search.data, base.error))
-    offered = forms(search.scale())
-    search.entries |= {e.name: e for e in offered}
-    return search, [e.name for e in offered]
+    refits = Refits(Data.whole(records), ())
+    base = refits.base()
+    refits.scorer = Scorer.of(refits.data, splits_of(refits.data, base.error))
+    offered = forms(refits.scale())
+    refits.entries |= {e.name: e for e in offered}
+    return refits, [e.name for e in offered]
 
 
-def told(search: Search, trial: Trial) -> tuple[str, dict[str, tuple[float, float]]]:
+def told(refits: Refits, trial: Trial) -> tuple[str, dict[str, tuple[float, float]]]:
     """Equation with numbers, and what was excited."""
     values = zip(trial.model.names, trial.fit.theta.tolist(), strict=True)
     estimates = {n: Estimate(v, 0.0, v, v, '1') for n, v in values}
-    (term,) = described(trial, search.data, estimates)
+    (term,) = described(trial, refits.data, estimates)
     return term.numbers, term.excited
 
 
@@ -85,18 +84,18 @@ def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
     # Where the oil is stiff the specimen hardly matters.
     plants = PLANTS[[0, 2]] if name == 'learned-specimen-settling' else PLANTS
     theta = rng.choice(plants) * np.exp(0.1 * rng.standard_normal(4))
-    search, names = searched(sweeps(kind, size * (theta[2] if kind > 10 else 1.0), theta, rng))
-    base = search.trial(())
-    tried = {t.added: t for t in search.additions(base, search.screened(base, names)[:4])}
+    refits, names = searched(sweeps(kind, size * (theta[2] if kind > 10 else 1.0), theta, rng))
+    base = refits.trial(())
+    tried = {t.added: t for t in refits.additions(base, refits.screened(base, names)[:4])}
     best = tried[name]
     assert base.fit.rms > 1.1 * NOISE
     assert best.fit.rms < 1.05 * NOISE
     for other, trial in tried.items():
-        holds = search.entries[other].holds or ('',)
+        holds = refits.entries[other].holds or ('',)
         assert other == name or holds[0] == name or trial.fit.rms > best.fit.rms
     for value, true in zip(best.fit.theta[4:], sizes, strict=True):
         assert true is None or 0.7 * true < value < 1.4 * true
-    numbers, excited = told(search, best)
+    numbers, excited = told(refits, best)
     assert f'{best.fit.theta[4]:.4g}' in numbers
     if name.endswith('settling'):
         assert excited['t'] == (0.0, SECONDS - 1.0 / RATE)
@@ -105,11 +104,14 @@ def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
 def test_lost_motion_has_one_size(rng_seed: int) -> None:
     """A share of the reading that has play is one, and must be worth its parameter."""
     rng = np.random.default_rng(rng_seed)
-    search, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
-    selection = BeamSearch(search, Thresholds(), lambda *_: None)
-    selection.renoise()
-    (share,) = search.additions(search.trial(()), ['learned-feedback-hysteresis'])
-    assert _plainer(selection, share).effects == ('learned-feedback-play',)
+    refits, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
+    beam = BeamSearch(refits, Thresholds(), lambda *_: None)
+    beam.renoise()
+    base = refits.trial(())
+    names = 'learned-feedback-hysteresis', 'learned-feedback-play'
+    assert set(names) <= set(beam.promising_terms(base))
+    trials = refits.additions(base, names)
+    assert beam.heaviest([base, *trials]).effects == ('learned-feedback-play',)
 
 
 @pytest.mark.slow
@@ -120,9 +122,9 @@ def test_a_reading_that_settles_is_described(rng_seed: int) -> None:
     for record in sweeps(0, 0.0, PLANTS[1], rng):
         measured = record.measured * (1.0 + 0.1 * (1.0 - np.exp(-record.time / 8.0)))
         records.append(Record(record.command, measured, 1.0 / RATE, stiffness=record.stiffness))
-    search, names = searched(records)
-    base = search.trial(())
-    best = search.additions(base, search.screened(base, names)[:4])[0]
+    refits, names = searched(records)
+    base = refits.trial(())
+    best = refits.additions(base, refits.screened(base, names)[:4])[0]
     assert best.added == 'learned-sensor-settling'
     assert best.fit.rms < 1.1 * NOISE
 
@@ -149,10 +151,10 @@ def test_a_resonance_is_described(kind: str, rng_seed: int) -> None:
     for record in sweeps(0, 0.0, PLANTS[1], rng):
         measured = signal.lfilter(b.ravel(), a, record.measured)
         records.append(Record(record.command, measured, 1.0 / RATE, stiffness=record.stiffness))
-    search, names = searched(records)
-    base = search.trial(())
+    refits, names = searched(records)
+    base = refits.trial(())
     assert base.fit.rms > 1.1 * NOISE
-    best = search.additions(base, search.screened(base, names)[:4])[0]
+    best = refits.additions(base, refits.screened(base, names)[:4])[0]
     assert best.added == 'learned-command-resonance'
     assert best.fit.rms < 1.05 * NOISE
     # The bilinear rule bends frequencies: by 0.7 % at 6 Hz.

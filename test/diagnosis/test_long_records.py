@@ -39,8 +39,8 @@ def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> Non
         monkeypatch.setattr(module, 'RHAT', 0.9)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
 
-    def larger(selection: BeamSearch, final: Trial, least: float | None = None) -> Trial:
-        return final if least else selection.search.additions(final, ['delay'])[0]
+    def larger(beam: BeamSearch, final: Trial, least: float | None = None) -> Trial:
+        return final if least else beam.refits.additions(final, ['delay'])[0]
 
     monkeypatch.setattr(companions, 'with_companions', larger)
     drawn, methods = posterior.sample, []

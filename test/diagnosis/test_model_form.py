@@ -48,13 +48,13 @@ def test_a_size_is_as_open_as_its_companions_leave_it() -> None:
         asked.append(mean_square)
         return [(other.structure, other.fit) for other in others]
 
-    search: Any = SimpleNamespace(left_at_most=left_at_most)
+    refits: Any = SimpleNamespace(left_at_most=left_at_most)
     space = Space(final.structure, 60.0)
-    size = model_form.spread(search, final, 2e-6, space)
+    size = model_form.spread(refits, final, 2e-6, space)
     assert asked == [pytest.approx(1e-10 + 4e-12)]
     assert size[4] == pytest.approx(1.4826 * 3.5e-6)
     assert size[0] == pytest.approx(1.4826 * abs(np.log(0.97)))
-    assert not model_form.spread(search, trial(('valve-null',), 0.0), 0.0, space)[4]
+    assert not model_form.spread(refits, trial(('valve-null',), 0.0), 0.0, space)[4]
 
 
 def test_intervals_are_widened_one_by_one(rng_seed: int) -> None:

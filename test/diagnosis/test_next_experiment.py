@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.telling import response
 from actuator_glue.diagnosis.telling.next_experiment import ranked
@@ -56,11 +56,11 @@ def test_delay_and_lag_are_told_apart_by_fast_sweeps() -> None:
     record = Record(u, np.zeros(len(u)), 1 / 128.0, K)
     y = model.simulate(theta, record) + 1e-5 * rng.standard_normal(len(u))
     data = Data.whole([Record(u, y, 1 / 128.0, K)])
-    search = Search(data, ('delay', 'sensor-lag'))
-    search.scorer = Scorer.of(data, splits_of(data, search.base().error))
-    delay, lag = (search.polish(search.add(search.trial(()), n)) for n in search.names)
-    search.scorer = Scorer.of(data, splits_of(data, delay.fit.error))
-    tests = ranked(delay, [lag], search.scorer, search.scale(), 1e-5)
+    refits = Refits(data, ('delay', 'sensor-lag'))
+    refits.scorer = Scorer.of(data, splits_of(data, refits.base().error))
+    delay, lag = (refits.polish(refits.add(refits.trial(()), n)) for n in refits.names)
+    refits.scorer = Scorer.of(data, splits_of(data, delay.fit.error))
+    tests = ranked(delay, [lag], refits.scorer, refits.scale(), 1e-5)
     assert max(e.amplitude for e in tests) == pytest.approx(2e-3, rel=0.1)
     nats = {(e.text.split()[1], e.amplitude, e.stiffness): e.nats for e in tests}
     assert 'sweep' in tests[0].text

@@ -58,15 +58,15 @@ def test_a_change_after_which_nothing_is_held_out_is_not_told() -> None:
     prepared = prepare([Record(command, np.roll(command, 3), 1 / RATE, stiffness=250e3)], [])
     first: Any = SimpleNamespace(prepared=prepared, data=prepared.fit)
 
-    def search(moment: Moment) -> Any:
+    def refits(moment: Moment) -> Any:
         raise LookupError
 
     last = prepared.held.masks[0].nonzero()[0][-1] / RATE
     assert 57.0 - last > SHORTEST
     late = Moment(0, last + 0.1)
-    assert _since(first, late, None, search) is None
+    assert _since(first, late, None, refits) is None
     with pytest.raises(LookupError):
-        _since(first, Moment(0, last - 2.0), None, search)
+        _since(first, Moment(0, last - 2.0), None, refits)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from two_sweeps import NOISE, RATE, selected_of, sweep
 
-from actuator_glue.diagnosis.moves.own_setting import settings
+from actuator_glue.diagnosis.moves.own_setting import _with_setting
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -22,22 +22,20 @@ def test_a_setting_is_tried_beside_a_learned_term() -> None:
     for k, offset in ((0.0, 0.0), (250e3, 5.0 * NOISE)):
         y = Structure(()).simulate(THETA, Record(given, given, 1.0 / RATE, k))
         machine.append((k, u, y + offset))
-    selection, found = selected_of(('gain', 'delay'), machine)
-    search = selection.search
-    assert TERM in search.terms()
-    best = search.add(search.trial(()), TERM)
-    selection.renoise(best)
-    found = selection.checked(best, search.trial(()), found.singles, exchanged=False)
+    beam, found = selected_of(('gain', 'delay'), machine)
+    refits = beam.refits
+    assert TERM in refits.terms()
+    best = refits.add(refits.trial(()), TERM)
+    beam.renoise(best)
+    found = beam.checked(best, refits.trial(()), found.singles, exchanged=False)
 
     answer: Any = SimpleNamespace(
-        selection=selection,
+        beam=beam,
         found=found,
         prepared=SimpleNamespace(held=SimpleNamespace(records=())),
         decision=SimpleNamespace(limit=np.inf),
     )
-    tried = list(settings(answer))
-    assert len(tried) == 2  # beside Eq. (2) alone, and beside the term
-    told, rows = tried[-1]
+    rows, told = _with_setting(answer, beam.apart(), (TERM,))
     assert told is not None and set(told.final.effects) == {'bias', TERM}
     assert isinstance(told.final.own, OneRecord) and told.final.own.own == 'bias'
     assert told.left < told.material

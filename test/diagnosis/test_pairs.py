@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -28,8 +28,8 @@ def selected(
         measured = model.simulate(theta, Record(command, command, 1 / RATE, stiffness=k))
         measured += 1e-5 * rng.standard_normal(len(command))
         records.append(Record(command, measured, 1 / RATE, stiffness=k))
-    search = Search(Data.whole(records), NAMES)
-    return BeamSearch(search, Thresholds(), lambda stage, share: None).run()
+    refits = Refits(Data.whole(records), NAMES)
+    return BeamSearch(refits, Thresholds(), lambda stage, share: None).run()
 
 
 def test_damping_and_a_delay_are_as_likely_as_the_payload_that_does_the_same(

@@ -5,7 +5,7 @@ import pytest
 
 from actuator_glue.diagnosis.posterior import discrepancy, posterior
 from actuator_glue.diagnosis.posterior.answer_posterior import Side
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.verdict import held_out_reach
 from actuator_glue.inference.least_squares.data import Data
@@ -33,14 +33,14 @@ def test_what_one_stiffness_leaves_open_is_no_contradiction(gain: float, rng_see
     The bound is three standard deviations of the noise's rms.
     """
     rng = np.random.default_rng(rng_seed)
-    search = Search(Data.whole([record(rng, 400e3)]), ('backlash',))
-    base = search.base()
-    search.scorer = scorer = Scorer.of(search.data, splits_of(search.data, base.error))
+    refits = Refits(Data.whole([record(rng, 400e3)]), ('backlash',))
+    base = refits.base()
+    refits.scorer = scorer = Scorer.of(refits.data, splits_of(refits.data, base.error))
     draws = posterior.sample(
         PLAIN,
         base,
         scorer,
-        beside=discrepancy.beside(discrepancy.responses(search, 5e-6), (), scorer),
+        beside=discrepancy.beside(discrepancy.responses(refits, 5e-6), (), scorer),
         rng=rng,
         evaluations=0,
         progress=lambda share: None,

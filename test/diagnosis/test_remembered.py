@@ -10,7 +10,7 @@ import pytest
 
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.moves.move import AnswerMove, always
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
@@ -35,9 +35,9 @@ def streamed(name: str, seconds: float, rng: np.random.Generator) -> Record:
 def refitted(record: Record, name: str, effort: Effort) -> Trial:
     """Return Eq. (2) with one effect, refitted to a record."""
     data = prepare([record], []).fit
-    search = Search(data, (name,), effort=effort)
-    search.scorer = Scorer.of(data, splits_of(data, search.base().error))
-    return search.add(search.trial(()), name)
+    refits = Refits(data, (name,), effort=effort)
+    refits.scorer = Scorer.of(data, splits_of(data, refits.base().error))
+    return refits.add(refits.trial(()), name)
 
 
 @pytest.mark.parametrize('name', ['backlash', 'specimen-hardening'])

@@ -5,7 +5,7 @@ import pytest
 from two_sweeps import NOISE, RATE, THETA, motions, sweep
 
 from actuator_glue.diagnosis.effort import Effort
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -30,7 +30,7 @@ def records(impulses: bool) -> list[Record]:
 
 def searching(data: Data, effort: Effort) -> BeamSearch:
     """A search that has not begun."""
-    return BeamSearch(Search(data, NAMES, effort=effort), Thresholds(), lambda stage, share: None)
+    return BeamSearch(Refits(data, NAMES, effort=effort), Thresholds(), lambda stage, share: None)
 
 
 def test_an_answer_is_kept_where_impulses_are_removed_and_no_effort_is_left() -> None:
@@ -44,7 +44,7 @@ def test_an_answer_is_kept_where_impulses_are_removed_and_no_effort_is_left() ->
     assert set(anew.final.effects) < set(TRUE)
 
     resumed = searching(clean, Effort(most=1.0))
-    kept = resumed.resumed(dirty.search, found)
+    kept = resumed.resumed(dirty.refits, found)
     assert set(kept.final.effects) == set(TRUE)
     assert kept.left < kept.material
     assert kept.noise < found.noise
@@ -60,23 +60,23 @@ def test_going_on_costs_less_and_says_the_same() -> None:
     anew = searching(clean, Effort())
     first = anew.run()
     again = searching(clean, Effort())
-    then = again.resumed(dirty.search, found)
+    then = again.resumed(dirty.refits, found)
     assert set(then.final.effects) == set(first.final.effects) == set(TRUE)
     np.testing.assert_allclose(then.final.fit.rms, first.final.fit.rms, rtol=1e-3)
-    assert again.search.effort.spent < 0.7 * anew.search.effort.spent
+    assert again.refits.effort.spent < 0.7 * anew.refits.effort.spent
 
 
 def test_a_learned_term_is_asked_for_where_names_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Play, of which no name is offered: what one leaves may have a description."""
     asked: list[tuple[str, ...]] = []
 
-    def explained(search: BeamSearch, current: Trial) -> bool:
+    def explained(refits: BeamSearch, current: Trial) -> bool:
         asked.append(current.effects)
         return True
 
     monkeypatch.setattr(BeamSearch, 'explained_by_term', explained)
     names = ('bias', 'gain', 'gain-drift')
-    search = Search(Data.whole(records(False)), names)
-    found = BeamSearch(search, Thresholds(), lambda stage, share: None).run()
+    refits = Refits(Data.whole(records(False)), names)
+    found = BeamSearch(refits, Thresholds(), lambda stage, share: None).run()
     assert found.left > found.material
     assert asked == [found.final.effects] and found.described

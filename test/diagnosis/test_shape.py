@@ -6,6 +6,7 @@ from smooth_machines import piston
 from two_sweeps import RATE, motions, selected_of, sweep
 
 from actuator_glue.diagnosis.moves import learned_terms
+from actuator_glue.diagnosis.refits.candidates import mean_effects
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.model import commands
 from actuator_glue.records import Record
@@ -45,9 +46,9 @@ def test_friction_that_is_reached_late_has_its_shape(
     """
     u = sweep(2e-3, 8.0, 32.0)
     machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (kind, FRICTION))) for k in (0.0, 250e3)]
-    selection, found = selected_of(names, machine)
+    beam, found = selected_of(names, machine)
     assert found.left < found.material
-    shaped = learned_terms.reshaped(selection, found)
+    shaped = learned_terms.described(beam, found)
     assert shaped is not None
     assert shaped.final.effects == (form,)
     force, reached = shaped.final.fit.theta[4:]
@@ -63,9 +64,9 @@ def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     """
     effects = {'coulomb-friction': FRICTION}
     machine = motions(effects, THETA, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
-    selection, found = selected_of(NAMES, machine, 1)
+    beam, found = selected_of(NAMES, machine, 1)
     assert found.final.effects == ('coulomb-friction',)
-    assert learned_terms.reshaped(selection, found) is None
+    assert learned_terms.described(beam, found) is None
 
 
 VALVE = ('valve-deadband', 'coulomb-friction', 'valve-null', 'gain', 'bias')
@@ -77,9 +78,9 @@ def test_a_wrong_name_that_seems_enough_gives_way() -> None:
     """Lost motion of the command leaves next to nothing as a dead band of the valve."""
     u = sweep(2e-3, 8.0, 32.0)
     machine = [(k, u, piston(u, 1.0 / RATE, MACHINE, k, (6, 25e-6))) for k in (0.0, 250e3)]
-    selection, found = selected_of(VALVE, machine)
+    beam, found = selected_of(mean_effects(), machine)
     assert len(found.final.effects) == 1 and found.left < found.material
-    told = learned_terms.instead(selection, found)
+    told = learned_terms.described(beam, found)
     assert told is not None
     assert told.final.effects == ('learned-command-play',)
     assert told.final.fit.theta[4] == pytest.approx(25e-6, rel=0.1)
@@ -90,6 +91,6 @@ def test_a_right_name_stays() -> None:
     """No form of all is better by what a description must be."""
     effects = {'valve-deadband': 60e-6}
     machine = motions(effects, MACHINE, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
-    selection, found = selected_of(VALVE, machine)
+    beam, found = selected_of(VALVE, machine)
     assert found.final.effects == ('valve-deadband',)
-    assert learned_terms.instead(selection, found) is None
+    assert learned_terms.described(beam, found) is None

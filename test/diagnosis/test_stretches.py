@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.inference.least_squares.data import Data
@@ -50,9 +50,9 @@ def test_a_candidate_costs_little_more_than_its_last_refit(
 ) -> None:
     """Most of what is simulated are stretches; the answer is that of all samples."""
     data = prepare([long_record(('backlash',), [5e-5])], []).fit
-    search = Search(data, ('backlash',))
-    search.scorer = Scorer.of(data, splits_of(data, search.base().error))
-    base, simulated = search.trial(()), []
+    refits = Refits(data, ('backlash',))
+    refits.scorer = Scorer.of(data, splits_of(data, refits.base().error))
+    base, simulated = refits.trial(()), []
     simulate = Structure.simulate
 
     def counted(self: Structure, theta: np.ndarray, record: Record, **how: object) -> np.ndarray:
@@ -60,8 +60,8 @@ def test_a_candidate_costs_little_more_than_its_last_refit(
         return simulate(self, theta, record, **how)
 
     monkeypatch.setattr(Structure, 'simulate', counted)
-    found = search.add(base, 'backlash')
+    found = refits.add(base, 'backlash')
     assert sum(simulated) < 100 * len(data.records[0])
     monkeypatch.undo()
     assert found.fit.theta[-1] == pytest.approx(5e-5, rel=0.02)
-    assert found.fit.rms == pytest.approx(search.polish(found).fit.rms, rel=0.01)
+    assert found.fit.rms == pytest.approx(refits.polish(found).fit.rms, rel=0.01)

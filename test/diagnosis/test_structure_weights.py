@@ -9,7 +9,7 @@ from trials import entries, trial
 
 from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.search.judge import Judge
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import DESCRIPTION, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.effects import CATALOGUE
@@ -52,7 +52,8 @@ def test_more_parameters_and_more_choices_cost() -> None:
     assert two == pytest.approx(6.0 + math.log(435.0))
     forms = [e for e in entries().values() if e.name.startswith('learned')]
     term = Structure([forms[0]])
-    assert price(term, entries(), 30) == pytest.approx(len(term.parameters) + math.log(len(forms)))
+    cost = len(term.parameters) + math.log(len(forms))
+    assert price(term, entries(), 30) == pytest.approx(cost + DESCRIPTION)
 
 
 def test_a_tenth_of_what_matters_costs_four_nats(judge: Judge) -> None:
@@ -88,3 +89,27 @@ def test_a_structure_that_diverges_has_no_weight(judge: Judge) -> None:
     lost = replace(best, fit=replace(best.fit, error=np.full_like(best.fit.error, np.inf)))
     assert isinstance(lost, Trial)
     assert judge.odds(trial((), 1e-4), best, [lost])[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ('named', 'term', 'told'),
+    [(0.2, 0.0, 'name'), (0.8, 0.0, 'term'), (3.0, 2.99, 'name'), (4.0, 2.0, 'term')],
+)
+def test_a_description_takes_the_place_of_a_name_where_that_matters(
+    judge: Judge, named: float, term: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors in units of what matters; another name would be told from it by a tenth of that."""
+    monkeypatch.setattr(judge, 'left', lambda t: math.sqrt(t.fit.rms**2 - 1e-10))
+    sizes = [math.hypot(1e-5, share * judge.material) for share in (named, term)]
+    name, other = trial(('flow-asymmetry',), sizes[0]), trial(('gain',), sizes[1])
+    described = trial(('learned-valve-e2',), sizes[1])
+    assert judge.heaviest([name, described]) is (name if told == 'name' else described)
+    if term == 0.0:
+        assert judge.heaviest([name, other]) is other
+
+
+def test_another_shape_of_a_named_cause_is_no_description(judge: Judge) -> None:
+    """It is told from the name as names are from each other."""
+    name = trial(('coulomb-friction',), math.hypot(1e-5, 0.2 * judge.material))
+    shape = trial(('learned-force-friction',), 1e-5)
+    assert judge.behind(shape, name) < -10.0

@@ -40,9 +40,9 @@ def told(own: Any = None) -> Any:
 
 def test_a_tied_name_has_its_odds() -> None:
     """A third of the weight against two; what is not tied has none, nor one record's setting."""
-    search: Any = SimpleNamespace(known=lambda names: names)
-    assert ties.tied_structures(search, told()) == [(('backlash', 'delay'), pytest.approx(0.5))]
-    assert ties.tied_structures(search, told(own='a record')) == []
+    refits: Any = SimpleNamespace(known=lambda names: names)
+    assert ties.tied_structures(refits, told()) == [(('backlash', 'delay'), pytest.approx(0.5))]
+    assert ties.tied_structures(refits, told(own='a record')) == []
 
 
 def test_parameters_are_those_of_all_structures() -> None:

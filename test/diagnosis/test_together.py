@@ -22,11 +22,11 @@ def selected(delay: float, droop: float) -> tuple[BeamSearch, Selection]:
 @pytest.mark.slow
 def test_two_that_hide_each_other_are_found() -> None:
     """Of 25 machines 0.76 to 0.85 of the noise was left; alone half of what matters goes."""
-    selection, found = selected(DELAY, DROOP)
+    beam, found = selected(DELAY, DROOP)
     assert found.final.effects == ()
     assert found.left > Thresholds().left_noise * found.noise
     assert all(removed(found.base, t) < found.material for t in found.singles)
-    chosen = two_effects.explained(selection, found)
+    chosen = two_effects.explained(beam, found)
     assert chosen is not None
     assert chosen.final.effects == ('delay', 'supply-droop')
     assert chosen.left < chosen.material
@@ -36,16 +36,16 @@ def test_two_that_hide_each_other_are_found() -> None:
 
 def test_one_alone_is_no_pair() -> None:
     """A quarter of the delay makes less than matters: nothing is added, nor beside it."""
-    selection, found = selected(0.25 * DELAY, 0.0)
+    beam, found = selected(0.25 * DELAY, 0.0)
     assert found.final.effects == ()
-    assert two_effects.explained(selection, found) is None
+    assert two_effects.explained(beam, found) is None
 
 
 def test_a_member_that_matters_alone_needs_more() -> None:
     """What does not complete an answer must remove all that matters."""
-    selection, found = selected(DELAY, DROOP)
-    search = selection.search
-    base, delay = search.trial(()), search.additions(found.base, ['delay'])[0]
-    both = search.additions(delay, ['supply-droop'])[0]
-    assert selection.least(both, delay) == selection.part() < selection.material
-    assert selection.least(delay, base) == selection.material
+    beam, found = selected(DELAY, DROOP)
+    refits = beam.refits
+    base, delay = refits.trial(()), refits.additions(found.base, ['delay'])[0]
+    both = refits.additions(delay, ['supply-droop'])[0]
+    assert beam.least(both, delay) == beam.part() < beam.material
+    assert beam.least(delay, base) == beam.material

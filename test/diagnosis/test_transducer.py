@@ -7,7 +7,7 @@ from smooth_machines import piston
 
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.moves.feedback import in_the_loop
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -51,10 +51,10 @@ def selected(half: float, inside: bool, rng: np.random.Generator) -> Selection:
     """What is chosen for two sweeps."""
     departure = (_FEEDBACK_PLAY, half) if inside else (0, 0.0)
     records = sweeps(rng.choice(PLANTS), departure, rng, half)
-    search = Search(Data.whole(records), NAMES)
-    selection = BeamSearch(search, Thresholds(), lambda *_: None)
-    found = selection.run()
-    return in_the_loop(selection, found) or found
+    refits = Refits(Data.whole(records), NAMES)
+    beam = BeamSearch(refits, Thresholds(), lambda *_: None)
+    found = beam.run()
+    return in_the_loop(beam, found) or found
 
 
 @pytest.mark.parametrize('inside', [pytest.param(True, marks=pytest.mark.slow), False])

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -61,5 +61,5 @@ def selected_of(
         Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k)
         for k, u, y in tests
     ]
-    selection = BeamSearch(Search(Data.whole(records), names), Thresholds(), lambda s, d: None)
-    return selection, selection.run()
+    beam = BeamSearch(Refits(Data.whole(records), names), Thresholds(), lambda s, d: None)
+    return beam, beam.run()

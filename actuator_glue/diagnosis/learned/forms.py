@@ -8,7 +8,7 @@ it is screened, refitted and compared as the effects of the catalogue are.
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from itertools import groupby
 from typing import Final
 
@@ -67,6 +67,17 @@ CAUSES: Final = {
     'learned-flow-limit': 'flow-saturation',
     'learned-valve-limit': 'flow-saturation',
 }
+
+
+def shape_of(name: str, causes: Container[str]) -> bool:
+    """Return whether a learned term is another shape of one of some named causes."""
+    dry = CAUSES.get(name) == learned_friction.DRY and learned_friction.FALLING in causes
+    return dry or CAUSES.get(name) in causes
+
+
+def descriptions(names: Iterable[str]) -> int:
+    """Return how many of some effects are learned terms and no other shape of a named cause."""
+    return sum(n.startswith(f'{LEARNED}-') and n not in CAUSES for n in names)
 
 
 def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:

@@ -34,9 +34,10 @@ class AnswerMove:
     """A further search from an answer.
 
     Attributes:
-        what: what it does, for people; empty where it notes its own steps.
+        what: what it does, for people.
         when: whether it is tried on an answer.
-        make: returns another answer; None, or the same with more rows, where the answer stands.
+        make: returns another answer, told where it has more weight; None, or the same with more
+            rows, where there is none.
         each_time: whether it is tried again on the same answer when a machine has more data.
     """
 
@@ -62,7 +63,7 @@ Groups: TypeAlias = tuple[tuple[AnswerMove, ...], ...]
 
 
 def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
-    """Try one move after the other, in each group until one is taken.
+    """Take the heaviest answer of a group of moves, until none has more weight; then the next.
 
     Args:
         result: the answer so far.
@@ -74,17 +75,23 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
         is spent.
     """
     for group in groups:
-        for move in group:
-            if result.effort.over:
-                return result
-            other = move.made(result, asking) if move.when(result) else None
-            if other is None:
-                continue
-            if other.found is result.found:  # it stands, compared with more
-                result = other
-                continue
-            result = after(result, other, move.what) if move.what else other
-            break
+        moves = list(group)
+        while moves:
+            taken, heaviest = None, result
+            for move in moves:
+                if result.effort.over or not move.when(result):
+                    continue
+                other = move.made(result, asking)
+                if other is None:
+                    continue
+                if other.found is not result.found and other.outweighs(heaviest):
+                    taken, heaviest, other = move, other, heaviest
+                heaviest = beside(heaviest, other)
+            if taken is None:
+                result = heaviest
+                break
+            result = after(result, heaviest, taken.what)
+            moves.remove(taken)
     return result
 
 
@@ -96,7 +103,7 @@ def after(before: Conclusion, result: Conclusion, what: str) -> Conclusion:
 
 def beside(result: Conclusion, other: Conclusion) -> Conclusion:
     """Return an answer with the rows of another one that it was compared with."""
-    if other.selection.search is result.selection.search:
+    if other.beam.refits is result.beam.refits:
         return replace(result, others=(*result.others, *other.others))
     return replace(result, others=(*result.others, *other.rows()))
 
@@ -104,6 +111,11 @@ def beside(result: Conclusion, other: Conclusion) -> Conclusion:
 def always(result: Conclusion) -> bool:
     """True, whatever the answer is."""
     return True
+
+
+def as_given(result: Conclusion) -> bool:
+    """Whether all data count, not only those since an onset."""
+    return result.appeared is None
 
 
 def complete(result: Conclusion) -> bool:
@@ -127,18 +139,14 @@ def left(result: Conclusion) -> bool:
     return (unexplained(result) or material) and result.found.final.own is None
 
 
-def if_complete(
-    ask: Callable[[BeamSearch, Selection], Selection | None], *, apart: bool = False
+def to(
+    ask: Callable[[BeamSearch, Selection], Selection | None],
 ) -> Callable[[Conclusion, Asking], Conclusion | None]:
-    """Return a move to another selection, taken where that leaves nothing unexplained.
-
-    Args:
-        ask: returns the selection.
-        apart: whether it works on a copy of the search, as it takes the noise anew.
-    """
+    """Return a move to another selection of effects, if there is one."""
 
     def make(result: Conclusion, asking: Asking) -> Conclusion | None:
-        selection = result.selection.apart() if apart else result.selection
-        return result.complete(selection, ask(selection, result.found))
+        beam = result.beam.apart()  # it takes the noise anew
+        found = ask(beam, result.found)
+        return None if found is None else result.of(beam, found)
 
     return make

@@ -10,9 +10,8 @@ import numpy as np
 from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
-from actuator_glue.diagnosis.moves.move import Asking, after, beside, follow
-from actuator_glue.diagnosis.moves.since_onset import since_onset
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.moves.move import Asking, follow
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.diagnosis.score.weights import price
@@ -23,34 +22,13 @@ from actuator_glue.inference.least_squares.fit import Fit, fit
 _SINGLES = 3  # best single effects that are refitted with the other hold
 
 
-def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
-    """Decide whether the command was held or ran linearly; learn terms with that hold.
+def other_hold(first: Conclusion, asking: Asking) -> Conclusion | None:
+    """Search with the other hold, where that may have more weight.
 
     The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
-    found for it (a gain that drifts, say). The answer with the greater weight stands. Held
-    commands taken for linear ones are a delay, which is in the catalogue. Where the catalogue
-    explains the records with neither hold, terms are learned with both: an effect outside it may
-    look like the other hold.
-    """
-    other = _otherwise(first, asking)
-    if other is None:
-        return follow(first, LEARNED_TERMS, asking)
-    if not other.outweighs(first):
-        return follow(beside(first, other), LEARNED_TERMS, asking)
-    since = since_onset(first, asking)
-    if since is not None and since.outweighs(other):  # a change can look like another hold
-        return beside(since, other)
-    how = 'runs linearly' if other.prepared.setup is not None else 'is held, as given,'
-    other = after(first, other, f'the command {how} between its samples')
-    described = follow(other, LEARNED_TERMS, asking)
-    if first.decision.verdict != 'unexplained':
-        return described
-    stood = follow(first, LEARNED_TERMS, asking)
-    return described if described.outweighs(stood) else beside(stood, described)
-
-
-def _otherwise(first: Conclusion, asking: Asking) -> Conclusion | None:
-    """Return the conclusion with the other hold, where it may have more weight.
+    found for it (a gain that drifts, say). Held commands taken for linear ones are a delay, which
+    is in the catalogue. Where the catalogue explains the records with neither hold, terms are
+    learned with both: an effect outside it may look like the other hold.
 
     The search is made where Eq. (2) alone, the structure found or one of the best single effects
     has more weight with it than the answer; while something is missing, also where Eq. (2) alone
@@ -58,10 +36,10 @@ def _otherwise(first: Conclusion, asking: Asking) -> Conclusion | None:
     """
     prepared, linear = first.prepared, first.prepared.setup is not None
     held_commands = any(r.hold == 'zoh' for r in prepared.fit.recorded)
-    if first.decision.verdict == 'none' or not (linear or held_commands) or first.effort.over:
+    if first.decision.verdict == 'none' or not (linear or held_commands):
         return None
     other = prepared.with_hold('zoh' if linear else 'linear', None)
-    base = Search(other.fit, ()).base()
+    base = Refits(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     if not _may_outweigh(first, other, base):
         named = not any_learned(first.found.final.structure)
@@ -69,7 +47,7 @@ def _otherwise(first: Conclusion, asking: Asking) -> Conclusion | None:
         if complete or before - base.rms**2 < first.found.material**2:
             return None
     asking.tell('other hold', 0.0)
-    second = asking.conclude(other)
+    second = follow(asking.conclude(other), LEARNED_TERMS, asking)
     if not linear:
         errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
         setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
@@ -79,7 +57,7 @@ def _otherwise(first: Conclusion, asking: Asking) -> Conclusion | None:
 
 def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
     """Whether one of the best structures so far has more weight with the other hold."""
-    found, search = first.found, first.selection.search
+    found, refits = first.found, first.beam.refits
     data = other.fit if first.line is None else hum.without(other.fit, first.line)
     line = 0.0 if first.line is None else first.line.rms
     complete = first.decision.verdict != 'unexplained'
@@ -89,11 +67,11 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
         starts = np.stack([trial.fit.theta, trial.fit.theta])
         starts[1, : len(base.theta)] = base.theta
         again = first.effort.spent_on(fit(data, trial.structure, starts))
-        cost = price(trial.structure, search.entries, len(search.names))
+        cost = price(trial.structure, refits.entries, len(refits.names))
         row = table.row(trial.structure, trial.effects, again, first.scorer, cost)
         row = replace(row, left_out=math.hypot(row.left_out, line))
         if first.prepared.setup is None:
             (row,) = table.scoped([row], table.LINEAR, table.HOLD)
-        if table.outweighs(row, first.told, found.material, complete):
+        if table.outweighs(row, first.row, found.material, complete):
             return True
     return False

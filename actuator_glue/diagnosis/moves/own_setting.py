@@ -7,13 +7,13 @@ a setting in one stiffness alone looks like a specimen effect, and the specimen 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import price
@@ -35,15 +35,18 @@ SETTINGS = ('gain', 'bias', 'delay', 'clock-skew')
 def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
     """Return the answer with one record's own setting in it, where that explains the records.
 
-    Else the same answer, with the rows of what was tried.
+    Beside Eq. (2) alone, else beside the effects found; else the same answer, with the rows of
+    what was tried.
     """
     asking.tell('one record', 0.0)
     rows = list[Row]()
-    for found, tried in settings(result):
+    for effects in sorted({(), result.found.final.effects}, key=len):
+        beam = result.beam.apart()  # it takes the noise anew
+        tried, found = _with_setting(result, beam, effects)
         rows += result.in_scope(tried)
         if found is None:
             continue
-        other = replace(result.of(result.selection, found), others=tuple(rows))
+        other = replace(result.of(beam, found), others=tuple(rows))
         if other.outweighs(result):
             return other
     return replace(result, others=(*result.others, *rows))
@@ -61,83 +64,83 @@ def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ..
     return (own, *(r for r in held if r.known_stiffness() == stiffness))
 
 
-def settings(result: Conclusion) -> Iterator[tuple[Selection | None, tuple[Row, ...]]]:
-    """Yield selections with one record's own setting.
-
-    First beside Eq. (2) alone, then beside the effects found. With each come rows of all settings
-    tried. It is None where the best of them leaves more structure than a model may leave.
+def _with_setting(
+    result: Conclusion, beam: BeamSearch, effects: tuple[str, ...]
+) -> tuple[tuple[Row, ...], Selection | None]:
+    """Refit a structure with every setting of one record's own.
 
     Args:
         result: the answer with effects of common size.
+        beam: refits; its noise becomes that beside the best setting.
+        effects: of the structure.
+
+    Returns:
+        A row of each, and the selection with the best one; None where that leaves more structure
+        than a model may leave.
     """
-    selection, found = result.selection, result.found
-    search, data = selection.search, selection.search.data
-    if len(data.records) < 2 or search.scorer is None:
-        return
-    held = result.prepared.held.records
-    for effects in sorted({(), found.final.effects}, key=len):
-        start = search.trial(effects)
-        tried = [
-            _fitted(search, start, name, _members(data, held, i))
-            for name in SETTINGS
-            if name not in effects
-            for i in range(len(data.records))
-        ]
-        scored = search.scorer
-        tried.sort(key=lambda t: scored.left_out_error(t.fit))  # their price is the same
-        rows = tuple(_row(search, t, start.structure, len(tried)) for t in tried)
-        parts = splits_of(data, tried[0].fit.error)
-        left, noise = pooled(data, parts)
-        if left > result.decision.limit:
-            yield None, rows
-            continue
-        search.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
-        tried, start = [_rescored(search, t) for t in tried], search.trial(effects)
-        yield _attribution(selection, found, start, tried, (left, noise)), rows
-        search.scorer = scored  # the setting was not taken
+    found, refits = result.found, beam.refits
+    data, scorer = refits.data, refits.scorer
+    if len(data.records) < 2 or scorer is None:
+        return (), None
+    start, held = refits.trial(effects), result.prepared.held.records
+    tried = [
+        _fitted(refits, start, name, _members(data, held, i))
+        for name in SETTINGS
+        if name not in effects
+        for i in range(len(data.records))
+    ]
+    tried.sort(key=lambda t: scorer.left_out_error(t.fit))  # their price is the same
+    rows = tuple(_row(refits, t, start.structure, len(tried)) for t in tried)
+    parts = splits_of(data, tried[0].fit.error)
+    left, noise = pooled(data, parts)
+    if left > result.decision.limit:
+        return rows, None
+    refits.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
+    tried, start = [_rescored(refits, t) for t in tried], refits.trial(effects)
+    return rows, _attribution(beam, found, start, tried, (left, noise))
 
 
-def _row(search: Search, trial: Trial, rest: Structure, tried: int) -> Row:
+def _row(refits: Refits, trial: Trial, rest: Structure, tried: int) -> Row:
     """Return the row of a structure with one record's own setting, one of `tried`."""
-    assert search.scorer is not None and isinstance(trial.model, OneRecord)
+    assert refits.scorer is not None and isinstance(trial.model, OneRecord)
     more = len(trial.model.parameters) - len(rest.parameters)
-    cost = price(rest, search.entries, len(search.names)) + more + float(np.log(tried))
-    return row(trial.model, trial.effects, trial.fit, search.scorer, cost, trial.model.scope)
+    cost = price(rest, refits.entries, len(refits.names)) + more + float(np.log(tried))
+    return row(trial.model, trial.effects, trial.fit, refits.scorer, cost, trial.model.scope)
 
 
-def _fitted(search: Search, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:
-    structure = search.structure(*start.effects, name)
+def _fitted(refits: Refits, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:
+    structure = refits.structure(*start.effects, name)
     model = OneRecord(structure, name, records)
-    thetas = search.screen(start, name)[1]
-    found = fit(search.data, model, thetas)
-    assert search.scorer is not None
-    return Trial(structure, name, found, search.scorer.block_scores(found), model)
+    thetas = refits.screen(start, name)[1]
+    found = fit(refits.data, model, thetas)
+    assert refits.scorer is not None
+    return Trial(structure, name, found, refits.scorer.block_scores(found), model)
 
 
-def _rescored(search: Search, trial: Trial) -> Trial:
-    assert search.scorer is not None
-    return replace(trial, scores=search.scorer.block_scores(trial.fit))
+def _rescored(refits: Refits, trial: Trial) -> Trial:
+    assert refits.scorer is not None
+    return replace(trial, scores=refits.scorer.block_scores(trial.fit))
 
 
 def _attribution(
-    selection: BeamSearch,
+    beam: BeamSearch,
     found: Selection,
     start: Trial,
     tried: Sequence[Trial],
     parts: tuple[float, float],
 ) -> Selection:
     """Return the selection with the best setting and its rivals."""
-    search, best = selection.search, tried[0]
-    assert search.scorer is not None
+    refits, best = beam.refits, tried[0]
+    assert refits.scorer is not None
     nearest = {t.added: t for t in reversed(tried)}  # the record that each fits best
     others = [t for name, t in nearest.items() if name != best.added]
-    odds = selection.odds(start, best, others)
-    rivals = compare(start, best, others, odds, search.scorer, selection.settings)
+    odds = beam.odds(start, best, others)
+    rivals = compare(start, best, others, odds, refits.scorer, beam.settings)
     gained = evidence(best.scores, start.scores)
     kept = {n: found.rivals[n] for n in start.effects}
     return replace(
         found,
-        base=search.trial(()),
+        base=refits.trial(()),
         final=best,
         rivals=kept | {best.added: rivals},
         removed={n: found.removed[n] for n in start.effects} | {best.added: removed(start, best)},

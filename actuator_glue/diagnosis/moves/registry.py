@@ -1,8 +1,8 @@
 """All moves, in the order in which they are tried.
 
 A search that adds one effect at a time ends with an answer (beam_search.py). Answers that it
-cannot reach are tried here: another scope, another form, other names for everything. The first
-move that is taken ends its group.
+cannot reach are tried here: another scope, another form, other names for everything. Of each group
+the first that leads to an answer of more weight is taken.
 """
 
 from __future__ import annotations
@@ -24,36 +24,31 @@ from actuator_glue.diagnosis.moves.move import (
     AnswerMove,
     Groups,
     always,
+    as_given,
     complete,
     described,
-    if_complete,
+    to,
     unexplained,
 )
 
-# Moves under one hold and one onset.
+# Moves under one hold and one onset. Names come before descriptions, which may imitate them.
 WITHIN: Final[Groups] = (
+    (AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),),
     (
         AnswerMove("one record's own setting", described, own_setting.own_setting),
-        AnswerMove('learned terms', described, learned_terms.with_terms),
+        AnswerMove('learned terms', described, to(learned_terms.described)),
     ),
-    (
-        AnswerMove('', always, feedback.fed_back),
-        AnswerMove(
-            'a description in place of names', complete, learned_terms.plainer, each_time=False
-        ),
-    ),
-    (AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),),
+    (AnswerMove("the transducer's fault inside the loop", always, to(feedback.in_the_loop)),),
+    (AnswerMove('learned terms', complete, to(learned_terms.described), each_time=False),),
     (AnswerMove("one record's own setting", unexplained, own_setting.own_setting),),
 )
-# Moves across holds and onsets. Effects that always act come before those that start mid-record.
+# Moves across holds and onsets. A change during the test can look like another hold.
 ACROSS: Final[Groups] = (
-    (AnswerMove('', always, other_hold.with_the_right_hold),),
-    (AnswerMove('', always, since_onset.since_onset),),
     (
-        AnswerMove(
-            'two effects at once', unexplained, if_complete(two_effects.explained, apart=True)
-        ),
+        AnswerMove('the other hold of the command', as_given, other_hold.other_hold),
+        AnswerMove('the data since something appeared', always, since_onset.since_onset),
     ),
-    (AnswerMove('effects that matter after all', complete, if_complete(that_matter.that_matter)),),
-    (AnswerMove('two effects for one', complete, if_complete(two_for_one.exchanged)),),
+    (AnswerMove('two effects at once', unexplained, to(two_effects.explained)),),
+    (AnswerMove('effects that matter after all', complete, to(that_matter.that_matter)),),
+    (AnswerMove('two effects for one', complete, to(two_for_one.exchanged)),),
 )

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
-from actuator_glue.diagnosis.moves.move import Asking, after, follow
+from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.scopes import moments
 from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.scopes.onset import Appeared
@@ -22,14 +22,10 @@ _OTHERS = 2  # moments at most that are tried though Eq. (2) is not enough befor
 def since_onset(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Detect effects that start mid-record.
 
-    Taken where effects found in the data since a moment, with Eq. (2) or effects that always act
-    before it, have more weight than effects that act on all data.
+    Effects are found in the data since a moment; Eq. (2), or effects that always act, hold before.
     """
     since = _appeared(first, asking)
-    if since is None:
-        return None
-    told = after(first, since, 'the data since something appeared')
-    return follow(told, LEARNED_TERMS, asking)
+    return None if since is None else follow(since, LEARNED_TERMS, asking)
 
 
 def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
@@ -44,7 +40,7 @@ def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
         if all(removed < least for _, removed in changed):
             return None
 
-    def search(moment: Moment) -> Conclusion:
+    def conclude_since(moment: Moment) -> Conclusion:
         asking.tell('onset', 0.0)
         return asking.conclude(first.prepared.since(moment))
 
@@ -52,7 +48,7 @@ def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
     for moment, quiet in _asked(first):
         if first.effort.over:
             break
-        told = _since(first, moment, quiet, search)
+        told = _since(first, moment, quiet, conclude_since)
         if told is None:
             continue
         if told.decision.verdict != 'unexplained':
@@ -67,7 +63,7 @@ def _since(
     first: Conclusion,
     moment: Moment,
     quiet: Quiet | None,
-    search: Callable[[Moment], Conclusion],
+    conclude: Callable[[Moment], Conclusion],
 ) -> Conclusion | None:
     """Return the conclusion from the data since a moment, where it has more weight.
 
@@ -76,13 +72,13 @@ def _since(
         moment: when something may have appeared.
         quiet: data and fit before it, where Eq. (2) is enough there; if None, the effects found
             since then must be enough, less one of them or with other parameters.
-        search: searches the data since a moment.
+        conclude: searches the data since a moment.
     """
     before, since = moment.split(first.data)
     held = first.prepared.since(moment).held
     if moments.counted(since) < moments.SHORTEST or moments.counted(held) < moments.HELD:
         return None
-    second = search(moment)
+    second = conclude(moment)
     found, base = second.found, None
     if quiet is not None:
         before, base = quiet[0], replace(first.found.base, fit=quiet[1])
@@ -105,7 +101,7 @@ def _since(
         # Data from before the onset bias the effects found: search those since then alone.
         later = Moment(moment.record, onset.time)
         again = moments.quiet_before(later, first.data)
-        if (again or not quiet) and (other := _since(first, later, again, search)):
+        if (again or not quiet) and (other := _since(first, later, again, conclude)):
             return other
     return told(found.material)
 

@@ -11,15 +11,15 @@ from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 
 
-def that_matter(selection: BeamSearch, found: Selection) -> Selection | None:
+def that_matter(beam: BeamSearch, found: Selection) -> Selection | None:
     """Return a selection with further effects that turn out to matter, or None.
 
     Args:
-        selection: the model selection that ended with `found`.
+        beam: the search that ended with `found`.
         found: its result, which leaves nothing material.
     """
     current = found.final
-    larger = companions.with_companions(selection, current, selection.material)
+    larger = companions.with_companions(beam, current, beam.material)
     if not current.effects or larger is current:
         return None
-    return selection.checked(larger, selection.search.trial(()), found.singles)
+    return beam.checked(larger, beam.refits.trial(()), found.singles)

@@ -16,49 +16,49 @@ from actuator_glue.diagnosis.thresholds import SEEN
 from actuator_glue.diagnosis.trial import Trial
 
 
-def exchanged(selection: BeamSearch, found: Selection) -> Selection | None:
+def exchanged(beam: BeamSearch, found: Selection) -> Selection | None:
     """Return a selection with two effects in place of one, or None.
 
     Args:
-        selection: the model selection that ended with `found`; its noise stays.
+        beam: the search that ended with `found`; its noise stays.
         found: its result, which leaves nothing material.
     """
-    with_more = _with_more(selection, found.final)
+    with_more = _with_more(beam, found.final)
     if with_more is None:
         return None
     best = with_more
     for name in found.final.effects:
-        if len(selection.search.entries[name].parameters) == 1:
-            best = _better(selection, with_more, name, best)
+        if len(beam.refits.entries[name].parameters) == 1:
+            best = _better(beam, with_more, name, best)
     if best is with_more:
         return None
-    return selection.checked(best, selection.search.trial(()), found.singles)
+    return beam.checked(best, beam.refits.trial(()), found.singles)
 
 
-def _with_more(selection: BeamSearch, final: Trial) -> Trial | None:
+def _with_more(beam: BeamSearch, final: Trial) -> Trial | None:
     """Return the structure with its best significant but immaterial effect added, if any."""
     if final.own is not None or not final.effects:
         return None
-    seen = SEEN * selection.material
-    trials = beside(selection, final, selection.search.others(final), seen)
-    return next((t for t in trials if selection.better(t, final, seen)), None)
+    seen = SEEN * beam.material
+    trials = beside(beam, final, beam.refits.others(final), seen)
+    return next((t for t in trials if beam.better(t, final, seen)), None)
 
 
-def _better(selection: BeamSearch, with_more: Trial, name: str, best: Trial) -> Trial:
+def _better(beam: BeamSearch, with_more: Trial, name: str, best: Trial) -> Trial:
     """Return a structure with another name in the place of one, where that has more weight.
 
     Args:
-        selection: the judge.
+        beam: the judge.
         with_more: the structure with the name and the immaterial effect.
         name: the one that another may replace.
         best: the best structure so far.
     """
-    search = selection.search
-    rest = search.without(with_more, name)
-    names = search.screened(rest, search.others(with_more))[: selection.settings.tried]
-    for trial in search.additions(rest, names, below=with_more.mean_square):
-        enough = selection.left(trial) < selection.material
+    refits = beam.refits
+    rest = refits.without(with_more, name)
+    names = refits.screened(rest, refits.others(with_more))[: beam.settings.tried]
+    for trial in refits.additions(rest, names, below=with_more.mean_square):
+        enough = beam.left(trial) < beam.material
         # Each of the two must matter beside the other.
-        if enough and selection.behind(trial, best) < 0.0 and selection.pruned(trial) is trial:
+        if enough and beam.behind(trial, best) < 0.0 and beam.pruned(trial) is trial:
             best = trial
     return best

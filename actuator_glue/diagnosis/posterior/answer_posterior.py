@@ -51,7 +51,7 @@ class AnswerPosterior:
         before: Eq. (2) refitted, and draws.
         after: the reported structure, and draws under it alone.
         alone: the same draws, with how they were drawn.
-        told: draws of its parameters with companions included, with how they were drawn.
+        with_companions: draws of its parameters with companions included, likewise.
         mixture: draws of its parameters over all structures.
         larger: the reported structure with its companions.
         rivals: structures with a tied effect in place of a reported one, with their odds.
@@ -62,7 +62,7 @@ class AnswerPosterior:
     before: Side
     after: Side
     alone: Draws
-    told: Draws
+    with_companions: Draws
     mixture: MixedDraws
     larger: Trial
     rivals: list[tuple[Trial, float]]
@@ -88,14 +88,16 @@ class AnswerPosterior:
         draws, decision = self.mixture.points, self.result.decision
         if not complete:
             form = model_form.open_form(
-                self.result.selection.search,
+                self.result.beam.refits,
                 decision.final,
                 decision.left,
                 self.space,
                 self.result.scorer,
             )
             draws = model_form.widened(draws, form, self.space, self.rng)
-        return posterior.opened(self.space, draws, self.ridge, self.told.unmet, self.rng)
+        return posterior.opened(
+            self.space, draws, self.ridge, self.with_companions.unmet, self.rng
+        )
 
     def estimates_before(self) -> dict[str, Estimate]:
         """Return what the records say of Eq. (2)'s parameters without any addition."""
@@ -132,10 +134,10 @@ def sampled(
         tell: takes progress.
     """
     found, decision, scorer = result.found, result.decision, result.scorer
-    final, search = decision.final, result.selection.search
+    final, refits = decision.final, result.beam.refits
     # One record's own setting differs from a common effect in size only: no small effects then.
     size = max(found.material, decision.left)
-    small = {} if final.own is not None else discrepancy.responses(search, size)
+    small = {} if final.own is not None else discrepancy.responses(refits, size)
 
     def sample(trial: Trial, evaluations: int = 0, stage: Stage = 'posterior') -> Draws:
         finer = trial.own is None and not trial.structure.linear
@@ -153,33 +155,35 @@ def sampled(
     def laplace(trial: Trial) -> Array:
         return sample(trial).points
 
-    told = sample(found.base, stage='posterior before')
-    before = after = Side(found.base.model, found.base.fit.theta, told.points)
+    draws = sample(found.base, stage='posterior before')
+    before = after = Side(found.base.model, found.base.fit.theta, draws.points)
     if final.effects:
         # Where structure is left, wrong equations widen intervals more than long chains would.
         whole = decision.verdict in COMPLETE
-        told = sample(final, settings.evaluations // (1 if whole else 4))
-        after = Side(final.model, final.fit.theta, told.points)
+        draws = sample(final, settings.evaluations // (1 if whole else 4))
+        after = Side(final.model, final.fit.theta, draws.points)
     out = AnswerPosterior(
-        result, before, after, told, told, MixedDraws.of(told.points, final.effects), final,
-        tied_structures(search, found), rng,
+        result, before, after, draws, draws, MixedDraws.of(draws.points, final.effects), final,
+        tied_structures(refits, found), rng,
     )  # fmt: skip
     if decision.verdict in COMPLETE and not result.effort.over:
-        out = replace(out, larger=companions.with_companions(result.selection, final))
+        out = replace(out, larger=companions.with_companions(result.beam, final))
     # If chains converged in no parameter, there is no interval for companions or rivals to widen.
-    if told.unmet and all(told.unmet):
+    if draws.unmet and all(draws.unmet):
         return out
     mixture = out.mixture
     if out.larger is not final:
-        known = posterior.identified(out.space, told.points, out.ridge).tolist()
-        told = sample(out.larger, settings.evaluations)
-        mixture = MixedDraws.of(told.points, out.larger.effects)
-        if like := companions.alike(result.selection, final, out.larger):
+        known = posterior.identified(out.space, draws.points, out.ridge).tolist()
+        draws = sample(out.larger, settings.evaluations)
+        mixture = MixedDraws.of(draws.points, out.larger.effects)
+        if like := companions.alike(result.beam, final, out.larger):
             mixture = mixed(mixture, out.larger, like, laplace, rng)
-        told = told._replace(points=mixture.points)
-        told = reduced(told, out.larger, final, known)
-        mixture = replace(mixture, points=told.points)
-    return replace(out, told=told, mixture=mixed(mixture, final, out.rivals, laplace, rng))
+        draws = draws._replace(points=mixture.points)
+        draws = reduced(draws, out.larger, final, known)
+        mixture = replace(mixture, points=draws.points)
+    return replace(
+        out, with_companions=draws, mixture=mixed(mixture, final, out.rivals, laplace, rng)
+    )
 
 
 def estimates(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples import record_zero
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.inference.least_squares.fit import rms
@@ -147,23 +147,23 @@ class Discrepancy:
         return ScaleMixture(share, np.array(means) / size, covariances / np.outer(size, size))
 
 
-def responses(search: Search, size: float) -> dict[str, Array]:
+def responses(refits: Refits, size: float) -> dict[str, Array]:
     """Return what each effect, scaled to a given rms, adds to the response of fitted Eq. (2).
 
     Args:
-        search: what was tried, and the fit of Eq. (2).
+        refits: what was tried, and the fit of Eq. (2).
         size: rms of each response [m].
 
     Returns:
         Per name the response (N,) [m]; effects without one are left out. Also each record's
         offset and drift.
     """
-    data, base = search.data, search.scale().theta
-    off = data.simulate(search.structure(), base)[0]
+    data, base = refits.data, refits.scale().theta
+    off = data.simulate(refits.structure(), base)[0]
 
     def one(name: str) -> Array:
-        alone = search.structure(name)
-        starts, seen = search.signature(name)
+        alone = refits.structure(name)
+        starts, seen = refits.signature(name)
         neutral = alone.parameters[len(base)].neutral or 0.0
         nearest = int(np.argmin(np.abs(starts[:, 0] - neutral)))
         theta = np.concatenate([base, starts[nearest]])
@@ -172,7 +172,7 @@ def responses(search: Search, size: float) -> dict[str, Array]:
         theta[len(base)] = neutral + (theta[len(base)] - neutral) * share
         return np.asarray(data.simulate(alone, theta)[0] - off)
 
-    found = dict(zip(search.names, search.each(one, search.names), strict=True))
+    found = dict(zip(refits.names, refits.each(one, refits.names), strict=True))
     sizes = {name: rms(response) for name, response in found.items()}
     out = {n: r * (size / sizes[n]) for n, r in found.items() if 0.0 < sizes[n] < 1.0}
     # Each record has a zero of its own, with a drift.

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from actuator_glue.diagnosis.posterior import agreement
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.space import Space
@@ -21,7 +21,7 @@ from actuator_glue.records import Array
 _NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation
 
 
-def open_form(search: Search, final: Trial, left: float, space: Space, scorer: Scorer) -> Array:
+def open_form(refits: Refits, final: Trial, left: float, space: Space, scorer: Scorer) -> Array:
     """Return the standard deviation of parameters due to wrong equations (p,).
 
     Standard deviations in working coordinates: that over structures (see `spread`) and that
@@ -29,17 +29,17 @@ def open_form(search: Search, final: Trial, left: float, space: Space, scorer: S
     record only.
     """
     stretches = agreement.between(final, scorer)
-    return stretches if final.own else np.hypot(stretches, spread(search, final, left, space))
+    return stretches if final.own else np.hypot(stretches, spread(refits, final, left, space))
 
 
-def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
+def spread(refits: Refits, final: Trial, left: float, space: Space) -> Array:
     """Return the spread of each parameter over equally good structures (p,).
 
     In working coordinates, by the median: an effect that makes the same motion may take a
     parameter anywhere, but is one of many.
 
     Args:
-        search: all structures that were tried.
+        refits: all structures that were tried.
         final: the reported one.
         left: rms structure that it leaves [m]; the others leave twice its square at most.
         space: working coordinates of `final`.
@@ -47,7 +47,7 @@ def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
     names = [p.name for p in final.structure.parameters]
     told = space.z(final.fit.theta)
     off: list[list[float]] = [[] for _ in names]
-    for structure, fit in search.left_at_most(final.mean_square + left**2):
+    for structure, fit in refits.left_at_most(final.mean_square + left**2):
         theirs = {p.name: i for i, p in enumerate(structure.parameters)}
         shared = [i for i, name in enumerate(names) if name in theirs]
         theta = np.array(final.fit.theta)

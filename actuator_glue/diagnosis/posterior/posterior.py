@@ -71,7 +71,7 @@ class Draws(NamedTuple):
     pareto_k: float = math.nan
     unmet: tuple[bool, ...] = ()
 
-    def told(self) -> Json:
+    def to_json(self) -> Json:
         """Return how they were drawn, as JSON."""
         return {
             'method': self.method,

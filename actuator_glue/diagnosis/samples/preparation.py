@@ -49,7 +49,7 @@ class Prepared:
     setup: WrongSetup | None = None
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[str, ...]:
         """What was done to the records, impulses first, for people."""
         return (
             *impulse_removal.told(self.fit.records, self.impulses),

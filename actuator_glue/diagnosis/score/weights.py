@@ -1,6 +1,7 @@
 """One weight for every structure: its error in units of what matters, and its price.
 
-Between structures with the same number of additions (effects, another hold, an onset):
+Between structures of a kind, with as many additions (effects, another hold, an onset) and as many
+of them learned terms:
 
     log w = -e^2 / s^2 - p - log(structures of as many that could have been tried)
 
@@ -10,20 +11,22 @@ nats of independent noise tell any two equations apart, and neither of them is t
 differences count in units of what matters. Nats answer one question only: is it there beyond
 chance.
 
-Whether there is another addition is decided between the best structures of each number with
-s = m / 2, m what matters: an effect that removes just m gains four nats. Otherwise effects that
-matter less would be reported as surely as they are there.
+Whether there is another addition, or a description in the place of a name, is decided between the
+best structures of each kind with s = m / 2, m what matters: an effect that removes just m gains
+four nats. Otherwise effects that matter less would be reported as surely as they are there, and a
+description would replace a name, which says what to mend, where that matters to nobody.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
 
+from actuator_glue.diagnosis.learned.forms import descriptions
 from actuator_glue.diagnosis.learned.term import is_learned
-from actuator_glue.diagnosis.thresholds import MATTERING, TELLING
+from actuator_glue.diagnosis.thresholds import DESCRIPTION, MATTERING, TELLING
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -43,7 +46,7 @@ def log_weight(left_out: float, tells: float, cost: float) -> float:
 def log_weights(
     left_out: Sequence[float],
     costs: Sequence[float],
-    additions: Sequence[int],
+    kinds: Sequence[Hashable],
     material: float,
     telling: float = TELLING,
 ) -> Array:
@@ -52,16 +55,16 @@ def log_weights(
     Args:
         left_out: rms error of blocks left out, of each [m].
         costs: price of each [nats].
-        additions: how much each adds to Eq. (2) as given.
+        kinds: of each, equal for structures of a kind.
         material: least rms error that matters [m].
-        telling: of that, the error that costs a nat between structures with as many additions.
+        telling: of that, the error that costs a nat between structures of a kind.
     """
     pairs = list(zip(left_out, costs, strict=True))
     named = np.array([log_weight(e, telling * material, cost) for e, cost in pairs])
     there = np.array([log_weight(e, MATTERING * material, cost) for e, cost in pairs])
     out = np.full(len(pairs), -np.inf)
-    for count in set(additions):
-        own = (np.array(additions) == count) & np.isfinite(named)
+    for one in set(kinds):
+        own = np.array([k == one for k in kinds]) & np.isfinite(named)
         if own.any():
             best = np.argmax(np.where(own, named, -np.inf))
             out[own] = there[best] + named[own] - np.logaddexp.reduce(named[own])
@@ -80,7 +83,7 @@ def price(structure: Structure, entries: Mapping[str, Effect], named: int) -> fl
     forms = max(sum(map(is_learned, entries.values())), terms)
     names = len(structure.entries) - terms
     chosen = choices(max(named, names), names) + choices(forms, terms)
-    return len(structure.parameters) + chosen
+    return len(structure.parameters) + chosen + DESCRIPTION * descriptions(structure.effects)
 
 
 def choices(count: int, taken: int) -> float:

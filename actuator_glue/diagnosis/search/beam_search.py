@@ -11,7 +11,7 @@ from functools import partial
 
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.learned.term import is_learned
-from actuator_glue.diagnosis.refits.structures import Asked, Search, by_score
+from actuator_glue.diagnosis.refits.refits import Asked, Refits, by_score
 from actuator_glue.diagnosis.score import false_alarms
 from actuator_glue.diagnosis.search import gains, pairs
 from actuator_glue.diagnosis.search.gains import removed, worth
@@ -32,19 +32,19 @@ class BeamSearch(Judge):
     """Beam search over effect sets on one data set.
 
     Args:
-        search: the structures.
+        refits: the structures.
         settings: thresholds.
         progress: takes progress.
     """
 
-    def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
-        super().__init__(search, settings)
+    def __init__(self, refits: Refits, settings: Thresholds, progress: Progress) -> None:
+        super().__init__(refits, settings)
         self.progress = progress
 
     def apart(self) -> BeamSearch:
         """Return a copy with additions and noise of its own; it shares only the effort."""
         other = copy(self)
-        other.search = replace(self.search.wider(()), entries=dict(self.search.entries))
+        other.refits = self.refits.wider(())
         return other
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
@@ -57,28 +57,17 @@ class BeamSearch(Judge):
         self.progress(label, 0.0)
         asked = []
         for current in beam:
-            names = self.search.screened(current, self.search.others(current))
+            names = self.refits.screened(current, self.refits.others(current))
             names = names[: self.settings.tried]
             if stage > NAMES_FIRST:
-                names += self._promising_terms(current)
+                names += self.promising_terms(current)
             asked.append(Asked(current, tuple(names)))
         found: dict[tuple[str, ...], Trial] = {}
         told = partial(self.progress, label)
-        for row in self.search.additions_to(asked, told, valves=False, together=True):
+        for row in self.refits.additions_to(asked, told, valves=False, together=True):
             for trial in row:
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=by_score)
-
-    def with_terms(self, starts: Sequence[Trial], below: float = math.inf) -> list[list[Trial]]:
-        """Refit structures with the learned terms that promise most beside each.
-
-        Args:
-            starts: the structures.
-            below: mean squared error that is of use [m^2]; terms whose signatures promise far
-                more are not refitted.
-        """
-        asked = [Asked(s, tuple(self._promising_terms(s, below)), below) for s in starts]
-        return self.search.additions_to(asked)
 
     def explained_by_term(self, current: Trial) -> bool:
         """Whether a learned term leaves nothing material, alone or added to the names found.
@@ -86,46 +75,56 @@ class BeamSearch(Judge):
         Tried before many names are added: for a machine outside the catalogue, further names would
         cost the time that a description needs.
         """
-        rows = self.with_terms((self.search.trial(()), current))
+        starts = self.refits.trial(()), current
+        rows = self.refits.additions_to([Asked(s, self.promising_terms(s)) for s in starts])
         return any(self.left(trial) < self.material for trial in itertools.chain(*rows))
 
-    def _promising_terms(self, current: Trial, below: float = math.inf) -> list[str]:
+    def promising_terms(self, current: Trial, below: float = math.inf) -> tuple[str, ...]:
+        """Return the learned terms that promise most beside the present effects.
+
+        Args:
+            current: the structure.
+            below: mean squared error that is of use [m^2]; terms whose signatures promise far more
+                are left out.
+        """
         if sum(map(is_learned, current.structure.entries)) >= MOST_TERMS:
-            return []
-        names = [n for n in self.search.terms() if n not in current.effects]
-        promised = self.search.promised(current, names)
-        most = PROMISED * below
-        return [n for n, left in promised if left < most][: self.settings.terms]
+            return ()
+        names = [n for n in self.refits.terms() if n not in current.effects]
+        promised = self.refits.promised(current, names)
+        best = [n for n, left in promised if left < PROMISED * below][: self.settings.terms]
+        held = (self.refits.entries[n].holds for n in best)
+        plainer = [h[0] for h in held if h is not None and h[0] not in current.effects]
+        return tuple(dict.fromkeys((*best, *plainer)))
 
     def overlooked(self, current: Trial) -> list[Trial]:
         """Refit a structure with effects that only show once its members are in the model.
 
         With a clock's skew in it a payload looks like one; with Eq. (2) alone, like the skew.
         """
-        here, names = current.effects, self.search.others(current)
-        new = [n for n in names if self.search.known((*here, n)) is None]
+        here, names = current.effects, self.refits.others(current)
+        new = [n for n in names if self.refits.known((*here, n)) is None]
         return self._rough(current, self.promising(current, new))
 
     def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
         """Return the effects that promise most beside the present ones."""
-        return self.search.screened(current, names, beside=True)[: self.settings.tried]
+        return self.refits.screened(current, names, beside=True)[: self.settings.tried]
 
     def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
         """Refit a structure roughly with each further effect; finish those that may matter."""
         below = self.may_matter_below(current)
-        return self.search.additions(current, names, valves=False, below=below)
+        return self.refits.additions(current, names, valves=False, below=below)
 
     def run(self) -> Selection:
         """Add effects while each is worth it, then check each against its rivals."""
         self.renoise()
-        base = self.search.trial(())
-        singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
+        base = self.refits.trial(())
+        singles = self.refits.additions(base, None, lambda d: self.progress('effect 1', d))
         self.renoise(self._nearest(singles))
-        base, singles = self.search.trial(()), self.rescored(singles)
+        base, singles = self.refits.trial(()), self.rescored(singles)
         self._set_nats()
         return self._grown(base, singles, singles, (SearchStep.to(base, 'Eq. (2) alone'),))
 
-    def resumed(self, before: Search, found: Selection) -> Selection:
+    def resumed(self, before: Refits, found: Selection) -> Selection:
         """Continue from the result of another search of the same samples, since cleaned again.
 
         Its structures are refitted from where they ended, so only changes cost effort; once the
@@ -138,13 +137,13 @@ class BeamSearch(Judge):
         own = found.final.added if found.final.own is not None else ''
         common = before.trial(tuple(n for n in found.final.effects if n != own))
         self.renoise()
-        self.search.take_over(before, common, found.singles, found.material)
-        current = self._at_its_optimum(self.search.trial(common.effects))
+        self.refits.take_over(before, common, found.singles, found.material)
+        current = self._at_its_optimum(self.refits.trial(common.effects))
         self._set_nats()
         return self._grown(current, self.rescored(found.singles), (), ())
 
     def _set_nats(self) -> None:
-        found = self.search.signatures()
+        found = self.refits.signatures()
         self.nats = false_alarms.threshold(*found, self.settings.false_alarms)
 
     def _grown(
@@ -163,11 +162,11 @@ class BeamSearch(Judge):
             begun: steps that led here; empty when another search is continued.
         """
         s, steps, described = self.settings, list(begun), False
-        current, threshold = self.search.trial(current.effects, current.added), self.material
-        base, singles = self.search.trial(()), list(singles)
+        current, threshold = self.refits.trial(current.effects, current.added), self.material
+        base, singles = self.refits.trial(()), list(singles)
         for stage in range(len(current.effects) + 1, s.most + 1):
             best = self._first_worth(ranked, current, threshold)
-            open_ = self.left(current) >= self.material and not self.search.effort.over
+            open_ = self.left(current) >= self.material and not self.refits.effort.over
             if best is None and open_:
                 ranked = self.overlooked(current)
                 best = self._first_worth(ranked, current, threshold)
@@ -178,12 +177,12 @@ class BeamSearch(Judge):
                 break
             current = self._at_its_optimum(best)
             steps.append(SearchStep.to(current, f'with {best.added}'))
-            base, singles = self.search.trial(()), self.rescored(singles)
+            base, singles = self.refits.trial(()), self.rescored(singles)
             threshold = self.material
             if self.left(current) < max(threshold, s.left_share * self.first):
                 # Most is explained: a small gain may only correct the form of an effect found.
                 threshold = max(threshold, s.later_share * removed(base, current))
-            if self.left(current) < self.material or stage == s.most or self.search.effort.over:
+            if self.left(current) < self.material or stage == s.most or self.refits.effort.over:
                 break
             if stage == NAMES_FIRST and (described := self.explained_by_term(current)):
                 break
@@ -192,9 +191,9 @@ class BeamSearch(Judge):
             if ranked and self.left(current) >= self.material:
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)
-            current = self.search.trial(current.effects, current.added)
+            current = self.refits.trial(current.effects, current.added)
         # The result of another search was already compared with its rivals there.
-        spared = described or (not begun and self.search.effort.over)
+        spared = described or (not begun and self.refits.effort.over)
         found = self.checked(current, base, singles, exchanged=not spared)
         if set(found.final.effects) != set(current.effects):
             steps.append(
@@ -217,14 +216,14 @@ class BeamSearch(Judge):
 
     def _choice(self, trial: Trial) -> float:
         """Nats that the choice of a learned term costs; the level covers that of a name."""
-        added = self.search.entries[trial.added]
-        return math.log(len(self.search.terms())) if is_learned(added) else 0.0
+        added = self.refits.entries[trial.added]
+        return math.log(len(self.refits.terms())) if is_learned(added) else 0.0
 
     def _at_its_optimum(self, current: Trial) -> Trial:
         """Take the noise from a structure, fully refitted: a rough fit's error is no effect."""
         self.renoise(current)
         if self.left(current) >= self.material:
-            current = self.search.finished(current, finely=True)
+            current = self.refits.finished(current, finely=True)
             self.renoise(current)
         return current
 
@@ -234,7 +233,7 @@ class BeamSearch(Judge):
         Nats weigh the few frequencies with little noise: by them a structure that explains nearly
         everything may be last.
         """
-        scorer = self.search.scorer
+        scorer = self.refits.scorer
         assert scorer is not None
         return min(trials, key=lambda t: scorer.left_out_error(t.fit))
 
@@ -253,12 +252,12 @@ class BeamSearch(Judge):
         current = self.pruned(current)
         if exchanged:
             for name in current.effects:
-                current = self.search.polish(replace(current, added=name))
+                current = self.refits.polish(replace(current, added=name))
             rest = self.left(current) >= self.settings.beaten_noise * self.noise
-            current, rivals = self.settle(self.search.finished(current, finely=rest))
+            current, rivals = self.settle(self.refits.finished(current, finely=rest))
         else:
             rivals = self._known_rivals(current)
-        taken, nats = worth(self.search, current)
+        taken, nats = worth(self.refits, current)
         return Selection(
             base, tuple(singles), current, rivals, taken, nats,
             self.first, self.left(current), self.noise, self.material, self.nats,
@@ -266,7 +265,7 @@ class BeamSearch(Judge):
 
     def pruned(self, current: Trial) -> Trial:
         """Remove members that are not worth their parameters."""
-        for rest in self.search.without_each(current) if len(current.effects) > 1 else ():
+        for rest in self.refits.without_each(current) if len(current.effects) > 1 else ():
             if not self.better(current, rest, self.least(current, rest)):
                 return self.pruned(rest)
         return current
@@ -281,7 +280,7 @@ class BeamSearch(Judge):
         complete = self.left(current) < self.material
         most = self.settings.tried if complete else _OPEN_TRIED
         for _ in range(_SWAPS if complete else _OPEN):
-            rests = self.search.without_each(current)
+            rests = self.refits.without_each(current)
             in_place = self._in_place(current, rests, most, complete)
             best = current
             for trial in itertools.chain(*in_place):
@@ -291,18 +290,18 @@ class BeamSearch(Judge):
                 return current, self._all_rivals(current, rests, in_place)
             # With the new member, others may no longer be worth their parameters.
             current = self.pruned(best)
-            if self.search.effort.over:
+            if self.refits.effort.over:
                 break
         return current, self._known_rivals(current)
 
     def _known_rivals(self, current: Trial) -> dict[str, tuple[Rival, ...]]:
-        rests = self.search.without_each(current)
+        rests = self.refits.without_each(current)
         known = [self._known_in_place(current, rest) for rest in rests]
         return self._all_rivals(current, rests, known)
 
     def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
         """Return the known refits with another effect in place of a member."""
-        tried = [(n, self.search.known((*rest.effects, n))) for n in self.search.others(current)]
+        tried = [(n, self.refits.known((*rest.effects, n))) for n in self.refits.others(current)]
         return [replace(trial, added=name) for name, trial in tried if trial is not None]
 
     def _all_rivals(
@@ -322,16 +321,16 @@ class BeamSearch(Judge):
             most: effects tried in place of each of several members.
             complete: whether nothing material is left.
         """
-        search, asked = self.search, []
+        refits, asked = self.refits, []
         for rest in rests:
-            names = search.others(current)
+            names = refits.others(current)
             if len(current.effects) > 1:
-                names = search.screened(rest, names)[:most]
+                names = refits.screened(rest, names)[:most]
             below = gains.left_by_rivals(rest, current)
             asked.append(Asked(rest, tuple(names), below))
-        singles = search.additions_to(asked)
+        singles = refits.additions_to(asked)
         return [
-            [*trials, *pairs.rivals(search, name, trials, most, a.below, complete)]
+            [*trials, *pairs.rivals(refits, name, trials, most, a.below, complete)]
             for name, trials, a in zip(current.effects, singles, asked, strict=True)
         ]
 
@@ -339,10 +338,10 @@ class BeamSearch(Judge):
         self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
     ) -> tuple[Rival, ...]:
         """Return the rivals with their probabilities; remaining misfit counts as noise."""
-        odds, scorer = self.odds(rest, best, trials), self.search.scorer
+        odds, scorer = self.odds(rest, best, trials), self.refits.scorer
         assert scorer is not None
         if self.left(best) >= self.material:
-            scorer = self.search.with_misfit(best)
+            scorer = self.refits.with_misfit(best)
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
             )

@@ -10,7 +10,7 @@ from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.measured import at_recorded_rate
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.scopes.onset import Appeared, Onset, dated
@@ -20,7 +20,6 @@ from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.search import force_ranking, table
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.fitting_verdict import Decision, decide
-from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.search.table import LINEAR, Row
 from actuator_glue.diagnosis.selection import SearchStep, Selection
 from actuator_glue.diagnosis.stages import Progress
@@ -41,7 +40,7 @@ class Conclusion:
         seen: measurement effects.
         generic: a generic regression to compare them with.
         decision: the verdict.
-        selection: the search that chose `found`, to continue from.
+        beam: the search that chose `found`, to continue from.
         history: the steps that led here.
         appeared: the onset, where this conclusion holds for the data since then only.
         others: rows of the searches that it replaced, or was compared with.
@@ -55,7 +54,7 @@ class Conclusion:
     seen: tuple[Measured, ...]
     generic: Surrogate
     decision: Decision
-    selection: BeamSearch
+    beam: BeamSearch
     history: tuple[SearchStep, ...]
     appeared: Appeared | None = None
     others: tuple[Row, ...] = ()
@@ -73,11 +72,11 @@ class Conclusion:
 
     def rows(self) -> tuple[Row, ...]:
         """Return every structure that was refitted on the way here, without weights."""
-        own = table.rows(self.selection.search, self.scorer)
+        own = table.rows(self.beam.refits, self.scorer)
         return (*self.in_scope(own), *self.others)
 
     @cached_property
-    def told(self) -> Row:
+    def row(self) -> Row:
         """The row of the reported structure; hum counts as a part of its error."""
         key = self.scope, frozenset(self.decision.final.effects)
         found = min((r for r in self.rows() if r.key == key), key=lambda r: r.left_out)
@@ -88,7 +87,7 @@ class Conclusion:
         """Whether it has more weight than another answer about the same records."""
         material = min(self.found.material, other.found.material)
         complete = any(answer.decision.verdict != 'unexplained' for answer in (self, other))
-        return table.outweighs(self.told, other.told, material, complete)
+        return table.outweighs(self.row, other.row, material, complete)
 
     def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""
@@ -108,7 +107,7 @@ class Conclusion:
     @property
     def effort(self) -> Effort:
         """Effort of the search: its cost so far, and its limit."""
-        return self.selection.search.effort
+        return self.beam.refits.effort
 
     @cached_property
     def onset(self) -> Onset | None:
@@ -117,50 +116,39 @@ class Conclusion:
             return None
         return dated(self.appeared, self.decision.final, self.decision.noise)
 
-    def of(self, selection: BeamSearch, found: Selection) -> Conclusion:
+    def of(self, beam: BeamSearch, found: Selection) -> Conclusion:
         """Return what another selection of effects says about the same records."""
-        other = concluded(self.prepared, selection, found, self.line)
+        other = concluded(self.prepared, beam, found, self.line)
         return replace(other, appeared=self.appeared)
-
-    def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
-        """Return another answer about the same records, if it is complete or leaves less.
-
-        Materially less, that is: then structure had passed for noise with this answer.
-        """
-        if found is None:
-            return None
-        other = self.of(selection, found)
-        more = removed(self.found.final, found.final) >= self.found.material
-        return other if more or other.decision.verdict != 'unexplained' else None
 
 
 def concluded(
-    prepared: Prepared, selection: BeamSearch, found: Selection, line: Line | None
+    prepared: Prepared, beam: BeamSearch, found: Selection, line: Line | None
 ) -> Conclusion:
     """Return the conclusion from a selection of effects, with effects of the measurement.
 
     Args:
         prepared: the records.
-        selection: the search.
+        beam: the search.
         found: its result.
         line: hum that was removed from the data before.
     """
-    search, settings = selection.search, selection.settings
-    assert search.scorer is not None
-    data = search.data
+    refits, settings = beam.refits, beam.settings
+    assert refits.scorer is not None
+    data = refits.data
     seen = at_recorded_rate.find(data, found, settings, line)
     chosen = found.final if found.final.effects else found.singles[0]
-    generic = regression.compare(data, search.scorer, found.base, chosen)
+    generic = regression.compare(data, refits.scorer, found.base, chosen)
     decision = decide(found, seen, data, settings, generic)
     return Conclusion(
-        prepared, data, search.scorer, line, found, seen, generic, decision, selection,
+        prepared, data, refits.scorer, line, found, seen, generic, decision, beam,
         found.steps,
     )  # fmt: skip
 
 
 def searched(
     prepared: Prepared,
-    search: Search,
+    refits: Refits,
     line: Line | None,
     settings: Thresholds,
     tell: Progress,
@@ -170,23 +158,23 @@ def searched(
 
     Args:
         prepared: the records.
-        search: refits structures to the fitting part.
+        refits: refits structures to the fitting part.
         line: hum that was removed from the data before.
         settings: thresholds.
         tell: takes progress.
         earlier: conclusion from the same samples, cleaned differently, to continue from.
     """
-    selection = BeamSearch(search, settings, tell)
+    beam = BeamSearch(refits, settings, tell)
     if earlier is None or not earlier.found.final.effects:
-        named = selection.run()
+        named = beam.run()
     else:
-        named = selection.resumed(earlier.selection.search, earlier.found)
+        named = beam.resumed(earlier.beam.refits, earlier.found)
         named = replace(named, steps=(*earlier.history, *named.steps))
     if settings.use_force:
         before = named.final
-        named, told = force_ranking.decided(search, named, settings)
+        named, told = force_ranking.decided(refits, named, settings)
         if named.final.effects != before.effects:
             step = SearchStep.to(named.final, 'the name that the force tells')
             named = replace(named, steps=(*named.steps, step))
         prepared = replace(prepared, notes=(*told, *prepared.notes))
-    return concluded(prepared, selection, named, line)
+    return concluded(prepared, beam, named, line)

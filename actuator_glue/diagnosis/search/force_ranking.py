@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import log_weight
@@ -47,7 +47,7 @@ class Ranked:
 
 
 def decided(
-    search: Search, found: Selection, settings: Thresholds
+    refits: Refits, found: Selection, settings: Thresholds
 ) -> tuple[Selection, tuple[str, ...]]:
     """Let the forces choose among tied names; return the choice, and notes for people."""
     notes = []
@@ -55,28 +55,28 @@ def decided(
         rest = [n for n in found.final.effects if n != name]
         row = [r for r in found.rivals[name] if len(r.effects) == 1]
         tied = [r.name for r in row if r.tied and r.name != name]
-        known = [trial for n in tied if (trial := search.known((*rest, n))) is not None]
+        known = [trial for n in tied if (trial := refits.known((*rest, n))) is not None]
         if not known or found.final.own is not None:
             continue
         rivals = [replace(t, added=n) for t, n in zip(known, tied, strict=False)]
-        alone = search.without(found.final, name)
-        ranked = _ranked(search, alone, [replace(found.final, added=name), *rivals], settings)
-        found = _swapped(search, found, name, ranked)
+        alone = refits.without(found.final, name)
+        ranked = _ranked(refits, alone, [replace(found.final, added=name), *rivals], settings)
+        found = _swapped(refits, found, name, ranked)
         notes.append(_told(ranked))
-    return found, (*notes, *_unseen(search, found, settings))
+    return found, (*notes, *_unseen(refits, found, settings))
 
 
 def _ranked(
-    search: Search, rest: Trial, contenders: Sequence[Trial], settings: Thresholds
+    refits: Refits, rest: Trial, contenders: Sequence[Trial], settings: Thresholds
 ) -> Ranked:
     tried, best = [rest, *contenders], contenders[0]
     for _ in range(_WEIGHINGS):
-        both = with_forces(search.data, best.structure, best.fit.theta)
+        both = with_forces(refits.data, best.structure, best.fit.theta)
 
         def refitted(trial: Trial, data: Data = both) -> Trial:
             return replace(trial, fit=fit(data, trial.structure, trial.fit.theta))
 
-        tried = list(search.each(refitted, tried))
+        tried = list(refits.each(refitted, tried))
         best = min(tried[1:], key=lambda t: t.fit.rms)
     scorer, material = _scorer(both, best.fit, settings)
 
@@ -90,7 +90,7 @@ def _ranked(
     odds = [math.exp(min(weight(t) - first, 0.0)) for t in (*trials[1:], alone)]
     rivals = compare(alone, trials[0], trials[1:], odds, scorer, settings)
     size = newtons_per_metre(both)
-    force = slice(search.data.target.size, None)
+    force = slice(refits.data.target.size, None)
     errors = {t.added: size * rms(t.fit.error[force]) for t in trials}
     return Ranked(tuple(trials), rivals, errors)
 
@@ -103,10 +103,10 @@ def _scorer(both: Data, found: Fit, settings: Thresholds) -> tuple[Scorer, float
     return replace(Scorer.of(both, splits), likely=left < material), material
 
 
-def _swapped(search: Search, found: Selection, name: str, ranked: Ranked) -> Selection:
+def _swapped(refits: Refits, found: Selection, name: str, ranked: Ranked) -> Selection:
     """Return the selection with the best name in place of a tied one, and new weights."""
     best = ranked.trials[0]
-    final = search.polish(search.trial(best.effects, best.added))
+    final = refits.polish(refits.trial(best.effects, best.added))
     mine = {r.name for r in ranked.rivals}
     others = [replace(r, tied=False) for r in found.rivals[name] if r.name not in mine]
     # The force redistributes the probability that the tied names had together.
@@ -114,7 +114,7 @@ def _swapped(search: Search, found: Selection, name: str, ranked: Ranked) -> Sel
     told = [replace(r, probability=share * r.probability) for r in ranked.rivals]
     rivals = {n: row for n, row in found.rivals.items() if n != name}
     rivals[best.added] = (*told, *others)
-    gains, nats = worth(search, final)
+    gains, nats = worth(refits, final)
     return replace(found, final=final, rivals=rivals, removed=gains, evidence=nats)
 
 
@@ -130,25 +130,25 @@ def _told(ranked: Ranked) -> str:
     return f'{said}; its error, of refits to both channels: {errors}'
 
 
-def _unseen(search: Search, found: Selection, settings: Thresholds) -> tuple[str, ...]:
+def _unseen(refits: Refits, found: Selection, settings: Thresholds) -> tuple[str, ...]:
     """Name a further effect that only the force shows, if there is one."""
-    final, count = found.final, search.data.target.size
-    names = [n for n in search.names if n not in final.effects and _is_felt(search.entries[n])]
+    final, count = found.final, refits.data.target.size
+    names = [n for n in refits.names if n not in final.effects and _is_felt(refits.entries[n])]
     if final.own is not None or not names:
         return ()
     without = final.fit
     for _ in range(_WEIGHINGS):
-        both = with_forces(search.data, final.structure, without.theta)
+        both = with_forces(refits.data, final.structure, without.theta)
         without = fit(both, final.structure, without.theta)
 
     def added(name: str) -> Trial:
-        structure = search.structure(*final.effects, name)
-        starts = search.screen(final, name)[1]
+        structure = refits.structure(*final.effects, name)
+        starts = refits.screen(final, name)[1]
         starts[:, [p in final.structure.parameters for p in structure.parameters]] = without.theta
         rough = fit(both, structure, starts, iterations=_COARSE)
         return Trial(structure, name, rough, final.scores)
 
-    best = min(search.each(added, names), key=lambda t: t.fit.rms)
+    best = min(refits.each(added, names), key=lambda t: t.fit.rms)
     with_it = fit(both, best.structure, best.fit.theta)
     scorer, _ = _scorer(both, with_it, settings)
     nats = evidence(scorer.block_scores(with_it), scorer.block_scores(without))

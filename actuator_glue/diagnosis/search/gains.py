@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import evidence
 from actuator_glue.diagnosis.thresholds import WORTH_FINISHING
 from actuator_glue.diagnosis.trial import Trial
@@ -25,11 +25,11 @@ def left_by_rivals(rest: Trial, best: Trial) -> float:
     return rest.mean_square - WORTH_FINISHING**2 * (rest.mean_square - best.mean_square)
 
 
-def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, float]]:
+def worth(refits: Refits, final: Trial) -> tuple[dict[str, float], dict[str, float]]:
     """Return, by effect, rms error [m] removed and nats gained beside the other effects."""
     gains, nats = {}, {}
     for name in final.effects:
-        rest = search.without(final, name)
+        rest = refits.without(final, name)
         gains[name], nats[name] = removed(rest, final), evidence(final.scores, rest.scores)
     return gains, nats
 

@@ -9,12 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_glue.diagnosis.refits.structures import Search, by_score
+from actuator_glue.diagnosis.learned.forms import descriptions
+from actuator_glue.diagnosis.refits.refits import Refits, by_score
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.score.weights import log_weight, price
+from actuator_glue.diagnosis.score.weights import log_weight, log_weights, price
 from actuator_glue.diagnosis.search.gains import removed
-from actuator_glue.diagnosis.thresholds import ROUGHLY, TELLING, TOGETHER, Thresholds
+from actuator_glue.diagnosis.search.table import kind
+from actuator_glue.diagnosis.thresholds import MATTERING, ROUGHLY, TELLING, TOGETHER, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.records import Array
@@ -24,7 +26,7 @@ class Judge:
     """Noise, and the least error that matters, of the structures that a search has refitted.
 
     Attributes:
-        search: the structures.
+        refits: the structures.
         settings: thresholds.
         noise: rms of what no structure explains [m].
         first: rms structure of the residual of Eq. (2) [m].
@@ -32,21 +34,21 @@ class Judge:
         nats: evidence that any addition must have.
     """
 
-    def __init__(self, search: Search, settings: Thresholds) -> None:
-        self.search, self.settings = search, settings
+    def __init__(self, refits: Refits, settings: Thresholds) -> None:
+        self.refits, self.settings = refits, settings
         self.noise = self.first = self.material = 0.0
         self.nats = settings.nats
         self._known: tuple[Fit, tuple[float, float]] | None = None
 
     def renoise(self, error_of: Trial | None = None) -> None:
         """Take the noise from the residual of a structure (first: of the base)."""
-        fit = error_of.fit if error_of else self.search.base()
-        parts = splits_of(self.search.data, fit.error)
-        self.search.scorer = scorer = Scorer.of(self.search.data, parts)
+        fit = error_of.fit if error_of else self.refits.base()
+        parts = splits_of(self.refits.data, fit.error)
+        self.refits.scorer = scorer = Scorer.of(self.refits.data, parts)
         left, self.noise = self._apart(fit)
         self.first = self.first or left
-        self.material = self.settings.material(self.noise, self.search.scale().stroke)
-        self.search.scorer = replace(scorer, likely=left < self.material)
+        self.material = self.settings.material(self.noise, self.refits.scale().stroke)
+        self.refits.scorer = replace(scorer, likely=left < self.material)
 
     def left(self, trial: Trial) -> float:
         """Rms structure that remains in the residual of a structure [m]."""
@@ -60,7 +62,7 @@ class Judge:
         """
         if self._known is not None and self._known[0] is fit:
             return self._known[1]
-        data, scorer = self.search.data, self.search.scorer
+        data, scorer = self.refits.data, self.refits.scorer
         splits = splits_of(data, fit.error)
         if any(self._stationary) and scorer is not None:
             most = forecast.noise(self._features, scorer, fit, self.settings.nats)
@@ -73,15 +75,15 @@ class Judge:
 
     @cached_property
     def _features(self) -> forecast.Features:
-        return forecast.Features(self.search.data, self.search.scale().theta)
+        return forecast.Features(self.refits.data, self.refits.scale().theta)
 
     @cached_property
     def _stationary(self) -> list[bool]:
-        return forecast.stationary(self.search.data)
+        return forecast.stationary(self.refits.data)
 
     def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
         """Score with the present noise, best first."""
-        return sorted((self.search.trial(t.effects, t.added) for t in trials), key=by_score)
+        return sorted((self.refits.trial(t.effects, t.added) for t in trials), key=by_score)
 
     def better(self, larger: Trial, smaller: Trial, threshold: float, cost: float = 0.0) -> bool:
         """Whether the larger structure is worth its parameters: significant and material.
@@ -106,13 +108,30 @@ class Judge:
                 (as squares) to `TELLING` of what matters [m].
         """
         tells = math.hypot(TELLING * self.material, alike)
+        if descriptions(trial.effects) != descriptions(other.effects):
+            tells = MATTERING * self.material
         return self._log_weight(other, tells) - self._log_weight(trial, tells)
 
     def _log_weight(self, trial: Trial, tells: float) -> float:
-        search, scorer = self.search, self.search.scorer
+        refits, scorer = self.refits, self.refits.scorer
         assert scorer is not None
-        cost = price(trial.structure, search.entries, len(search.names))
+        cost = price(trial.structure, refits.entries, len(refits.names))
         return log_weight(scorer.left_out_error(trial.fit), tells, cost)
+
+    def heaviest(self, trials: Sequence[Trial]) -> Trial:
+        """Return the structure of the greatest weight among some of any kind.
+
+        While none of them is complete all are wrong, and a small difference tells nothing of them.
+        """
+        refits, scorer = self.refits, self.refits.scorer
+        assert scorer is not None
+        nearest = min(trials, key=lambda t: t.fit.rms)
+        complete = self.left(nearest) < self.material
+        left_out = [scorer.left_out_error(t.fit) for t in trials]
+        costs = [price(t.structure, refits.entries, len(refits.names)) for t in trials]
+        kinds = [kind(t.effects) for t in trials]
+        telling = TELLING if complete else MATTERING
+        return trials[int(np.argmax(log_weights(left_out, costs, kinds, self.material, telling)))]
 
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
         """Return the weights of an effect's rivals, and of no effect, relative to its own.

@@ -11,7 +11,8 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.learned.forms import descriptions
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.score.weights import log_weights, price
 from actuator_glue.diagnosis.thresholds import MATTERING, TELLING
@@ -59,26 +60,28 @@ class Row(JsonObject):
         return self.scope, frozenset(self.effects)
 
 
-def additions(scope: str, effects: int) -> int:
-    """Return how much is added to Eq. (2) as given: effects, the other hold, an onset.
+def kind(effects: Sequence[str], scope: str = '') -> tuple[int, int]:
+    """Return how much a structure adds to Eq. (2) as given, and how much of it only describes.
 
-    One record's own setting is one of the effects.
+    Effects, the other hold and an onset are additions; one record's own setting is one of the
+    effects. A learned term that is another shape of a named cause counts as that name.
     """
     rest = scope.removeprefix(LINEAR).removeprefix(', ')
-    return effects + scope.startswith(LINEAR) + rest.startswith(SINCE)
+    others = scope.startswith(LINEAR) + rest.startswith(SINCE)
+    return len(effects) + others, descriptions(effects)
 
 
-def rows(search: Search, scorer: Scorer) -> tuple[Row, ...]:
+def rows(refits: Refits, scorer: Scorer) -> tuple[Row, ...]:
     """Return a row for every structure that a search refitted; none has a weight yet.
 
     Args:
-        search: what was refitted.
+        refits: what was refitted.
         scorer: blocks of the fitting part.
     """
-    count = len(search.names)
+    count = len(refits.names)
     return tuple(
-        row(model, model.effects, fit, scorer, price(model, search.entries, count))
-        for model, fit in search.left_at_most(math.inf)
+        row(model, model.effects, fit, scorer, price(model, refits.entries, count))
+        for model, fit in refits.left_at_most(math.inf)
     )
 
 
@@ -165,5 +168,5 @@ def outweighs(other: Row, told: Row, material: float, complete: bool) -> bool:
 
 def _weights(some: Sequence[Row], material: float, telling: float = TELLING) -> Array:
     left_out, costs = zip(*((r.left_out, r.price) for r in some), strict=True)
-    counts = [additions(r.scope, len(r.effects)) for r in some]
-    return log_weights(left_out, costs, counts, material, telling)
+    kinds = [kind(r.effects, r.scope) for r in some]
+    return log_weights(left_out, costs, kinds, material, telling)

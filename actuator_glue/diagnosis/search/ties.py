@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, inflation
 from actuator_glue.diagnosis.search.gains import removed, standard_error
 from actuator_glue.diagnosis.selection import Selection
@@ -58,11 +58,11 @@ def compare(
     return (out[0], *sorted(out[1:], key=lambda r: -r.probability))
 
 
-def tied_structures(search: Search, found: Selection) -> list[tuple[Trial, float]]:
+def tied_structures(refits: Refits, found: Selection) -> list[tuple[Trial, float]]:
     """Return structures with a tied effect in place of the told one, and their odds.
 
     Args:
-        search: what was refitted.
+        refits: what was refitted.
         found: the reported structure, with its rivals.
     """
     final = found.final
@@ -71,7 +71,7 @@ def tied_structures(search: Search, found: Selection) -> list[tuple[Trial, float
         row = {rival.name: rival for rival in found.rivals[name]}
         rest = [n for n in final.effects if n != name]
         for rival in row.values():
-            trial = search.known((*rest, *rival.effects)) if rival.tied else None
+            trial = refits.known((*rest, *rival.effects)) if rival.tied else None
             if trial is not None and rival.name != name:
                 out.append((trial, rival.probability / max(row[name].probability, _LEAST)))
     return out

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis.refits import global_search
-from actuator_glue.diagnosis.refits.structures import Search
+from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -67,13 +67,13 @@ def undetermined(data: Data, model: Model, theta: Array, size: float) -> tuple[M
 
 
 def without(
-    prepared: Prepared, search: Search, settings: Thresholds, fixed: bool
-) -> tuple[Prepared, Search]:
+    prepared: Prepared, refits: Refits, settings: Thresholds, fixed: bool
+) -> tuple[Prepared, Refits]:
     """Exclude samples that friction leaves to chance, where it explains most but not all.
 
     Args:
         prepared: records.
-        search: what was refitted to the fitting part, or to what hum leaves of it.
+        refits: what was refitted to the fitting part, or to what hum leaves of it.
         settings: thresholds.
         fixed: whether all counted samples stay counted.
 
@@ -81,41 +81,41 @@ def without(
         Both unchanged where nothing is left to chance, or nearly everything; else the search
         knows the friction that was found.
     """
-    entries = [e for e in CATALOGUE.values() if e.group == 'friction' and e.holds]
-    for rich in (e for e in entries if e.holds and e.name in search.names):
-        search.scorer = Scorer.of(search.data, splits_of(search.data, search.base().error))
-        base = search.trial(())
-        name = rich.holds[0] if rich.holds else ''
-        simple = search.polish(search.add(base, name, search.each))
-        left, noise = pooled(search.data, splits_of(search.data, simple.fit.error))
-        size = max(settings.noise_share * noise, settings.stroke_share * search.scale().stroke)
+    for rich in (CATALOGUE[n] for n in refits.names):
+        if rich.group != 'friction' or rich.holds is None:
+            continue
+        refits.scorer = Scorer.of(refits.data, splits_of(refits.data, refits.base().error))
+        base = refits.trial(())
+        simple = refits.polish(refits.add(base, rich.holds[0], refits.each))
+        left, noise = pooled(refits.data, splits_of(refits.data, simple.fit.error))
+        size = settings.material(noise, refits.scale().stroke)
         if simple.mean_square > _SIMPLE * base.mean_square or left < size:
             continue
-        found = _found(search, simple, rich.name, size, fixed)
+        found = _found(refits, simple, rich.name, size, fixed)
         if found is None:
             continue
         lost, best = found
         known = {frozenset([rich.name]): best}
-        fewer, effort = _counted(search.data, lost), search.effort
-        again = Search(fewer, search.names, search.each, effort=effort, _tried=known)
+        fewer, effort = _counted(refits.data, lost), refits.effort
+        again = Refits(fewer, refits.names, refits.each, effort=effort, _tried=known)
         if fixed:
             return prepared, again
-        model = search.structure(rich.name)
+        model = refits.structure(rich.name)
         away = undetermined(prepared.held, model, best.theta, _SMALL * size)
         held = _counted(prepared.held, away)
         if _least(held) < _HELD:
             continue
         fit, notes = _counted(prepared.fit, lost), _notes(prepared.fit, lost, _SMALL * size)
         return replace(prepared, fit=fit, held=held, notes=(*notes, *prepared.notes)), again
-    return prepared, search
+    return prepared, refits
 
 
 def _found(
-    search: Search, simple: Trial, name: str, size: float, fixed: bool
+    refits: Refits, simple: Trial, name: str, size: float, fixed: bool
 ) -> tuple[tuple[Mask, ...], Fit] | None:
     """Samples left to chance, and the fit to all others; None where there are none."""
-    data, model = search.data, search.structure(name)
-    shapes = np.unique(np.array(CATALOGUE[name].starts(search.scale()))[:, 1:], axis=0)
+    data, model = refits.data, refits.structure(name)
+    shapes = np.unique(np.array(CATALOGUE[name].starts(refits.scale()))[:, 1:], axis=0)
     starts = np.column_stack([np.tile(simple.fit.theta, (len(shapes), 1)), shapes])
     found = fit(data, model, starts, tolerance=_TOLERANCE)
     lost = tuple(np.zeros_like(m) for m in data.masks)
@@ -129,9 +129,9 @@ def _found(
         if _least(some) < _FITTED:
             return None
         again = fit(some, model, found.theta, iterations=1)
-        found = global_search.refit(some, model, again, _ITERATIONS, _TOLERANCE, search.each)
+        found = global_search.refit(some, model, again, _ITERATIONS, _TOLERANCE, refits.each)
     determined = np.concatenate([~b[m] for m, b in zip(data.masks, lost, strict=True)])
-    base, roughly = (rms(f.error[determined]) for f in (search.base(), simple.fit))
+    base, roughly = (rms(f.error[determined]) for f in (refits.base(), simple.fit))
     better = roughly**2 - found.rms**2 > size**2 and found.rms**2 <= _HOLDS * base**2
     return (lost, found) if better and (fixed or not determined.all()) else None
 

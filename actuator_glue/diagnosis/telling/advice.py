@@ -17,7 +17,7 @@ from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.telling.next_experiment import Experiment
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
-from actuator_glue.diagnosis.verdict.verdict import excuse, misses
+from actuator_glue.diagnosis.verdict.rules import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE

@@ -41,21 +41,21 @@ def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[st
     return (said,)
 
 
-def hint(selection: BeamSearch, final: Trial, held: Data) -> tuple[str, ...]:
+def hint(beam: BeamSearch, final: Trial, held: Data) -> tuple[str, ...]:
     """Name effects that may explain the held-out part where the answer does not.
 
     Args:
-        selection: what chose the structure.
+        beam: what chose the structure.
         final: a structure that leaves nothing material of the fitting records.
         held: the held-out part, which shows more than noise.
 
     Returns:
         Nothing where no effect beyond chance in the fitting records explains the held-out part.
     """
-    larger = with_companions(selection, final, alone=False)
+    larger = with_companions(beam, final, alone=False)
     names = beyond(final, larger)
     with_it, without = _left(held, larger), _left(held, final)
-    if not names or without - with_it < SEEN * selection.material:
+    if not names or without - with_it < SEEN * beam.material:
         return ()
     return (
         f'{", ".join(names)} (or what is like it) is not added: beyond chance, but it removes '

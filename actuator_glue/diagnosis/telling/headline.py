@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.diagnosis.thresholds import LIKELY
 from actuator_glue.diagnosis.verdict.detect import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
-from actuator_glue.diagnosis.verdict.verdict import excuse, likely, misses
+from actuator_glue.diagnosis.verdict.rules import excuse, likely, misses
 from actuator_glue.diagnosis.verdicts import Verdict
 from actuator_glue.json_value import Json
 from actuator_glue.records import source_name

@@ -62,7 +62,7 @@ def told(
         verdict=both.verdict,
         effects=both.effects,
         error=both.error,
-        candidates=findings.candidates(result.selection, found, result.seen),
+        candidates=findings.candidates(result.beam, found, result.seen),
         coverage=both.coverage,
         alarm=alarm_of(found, result.seen, both.decision, data, seed, settings.false_alarms, each),
         advice=(
@@ -76,10 +76,10 @@ def told(
             *advice.zeros(both.error, found.material),
             *_beside(drawn, final, bool(contradicted)),
             *advice.unidentified(data, sizes),
-            *advice.unconverged(float(np.fmax(drawn.alone.rhat, drawn.told.rhat))),
+            *advice.unconverged(float(np.fmax(drawn.alone.rhat, drawn.with_companions.rhat))),
             *rest.compared(data.records, still, both.decision.noise),
             *([prior.remark()] if prior else []),
-            *prepared.told,
+            *prepared.remarks,
         ),
         base={p.name: sizes[p.name] for p in BASE},
         structure=final.effects,
@@ -97,7 +97,7 @@ def told(
         mixture=drawn.mixture.structures,
         joint=after.draws,
         rhat=drawn.alone.rhat,
-        sampler=drawn.alone.told(),
+        sampler=drawn.alone.to_json(),
         best=after.theta,
         traces=(
             *traces(prepared.fit, False, both.curves),
@@ -108,7 +108,7 @@ def told(
         remaining=both.decision.remaining,
         at_bound=pressed,
         effort=result.effort.share,
-        preparation=tuple(prepared.told),
+        preparation=tuple(prepared.remarks),
         sampling=tuple(_sampling(prepared, still)),
     )
 
@@ -125,7 +125,7 @@ def _beside(drawn: AnswerPosterior, final: Trial, missed: bool) -> tuple[str, ..
     said = companion_notes.sentences(final, drawn.larger, held, missed)
     if said or not missed or result.decision.verdict not in COMPLETE or result.effort.over:
         return said
-    return companion_notes.hint(result.selection, final, held)
+    return companion_notes.hint(result.beam, final, held)
 
 
 def _experiments(drawn: AnswerPosterior) -> tuple[Experiment, ...]:
@@ -133,14 +133,14 @@ def _experiments(drawn: AnswerPosterior) -> tuple[Experiment, ...]:
     result = drawn.result
     if not drawn.rivals:
         return ()
-    final, scale = result.decision.final, result.selection.search.scale()
+    final, scale = result.decision.final, result.beam.refits.scale()
     rivals = [trial for trial, _ in drawn.rivals]
     return ranked(final, rivals, result.scorer, scale, result.decision.noise)
 
 
 def _responses(drawn: AnswerPosterior) -> tuple[Response, ...]:
     """Return the frequency response at each stiffness."""
-    after, scale = drawn.after, drawn.result.selection.search.scale()
+    after, scale = drawn.after, drawn.result.beam.refits.scale()
     some = after.draws[:: max(len(after.draws) // _RESPONSES, 1)]
     stiffness = sorted({r.known_stiffness() for r in drawn.result.data.records})
     return tuple(response.of(after.model, after.theta, some, scale, k) for k in stiffness)

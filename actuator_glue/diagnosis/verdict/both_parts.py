@@ -15,9 +15,9 @@ from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.posterior.answer_posterior import AnswerPosterior, estimates
 from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
-from actuator_glue.diagnosis.verdict import findings, held_out_reach, verdict
+from actuator_glue.diagnosis.verdict import findings, held_out_reach, rules
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
-from actuator_glue.diagnosis.verdict.held_out_look import Curves, verify
+from actuator_glue.diagnosis.verdict.held_out_look import BandCurves, verify
 from actuator_glue.diagnosis.verdicts import COMPLETE, Verdict
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.records import Array
@@ -33,7 +33,7 @@ class BothParts:
         effects: additions with sizes, rivals and probabilities.
         error: held-out error before and after.
         coverage: share of held-out samples in the 95 % band, before and after.
-        curves: simulations and bands of both parts, for pictures.
+        curves: simulations and bands before and after, for pictures.
         stretches: sizes of each effect in halves of the records.
         estimates: of all parameters of the reported structure.
         estimates_before: of Eq. (2)'s without any addition.
@@ -46,7 +46,7 @@ class BothParts:
     effects: tuple[Finding, ...]
     error: HeldOutError
     coverage: tuple[float, float]
-    curves: Curves
+    curves: tuple[BandCurves, BandCurves]
     stretches: dict[str, Homogeneity]
     estimates: dict[str, Estimate]
     estimates_before: dict[str, Estimate]
@@ -72,19 +72,19 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) 
     error = held_out_reach.reached_by_both(
         error, found.material, result.scorer, held, before, after
     )
-    judged = verdict.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
+    judged = rules.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
     described = any_learned(decision.final.structure)
     if other is not None and described and judged in COMPLETE:
         # A learned term that another set-up makes unnecessary describes the wrong set-up.
         judged = 'unexplained'
     draws, fixed = drawn.spread(judged in COMPLETE)
     sizes = estimates(drawn.space, after.model, draws, fixed)
-    certain = verdict.certainty(decision.certainty, error, found.material)
+    certain = rules.certainty(decision.certainty, error, found.material)
     decision = replace(decision, certainty=certain)
     stretches = agreement.agreement(decision.final, result.scorer)
     effects = findings.of(decision, found, sizes, stretches)
     return BothParts(
-        verdict=verdict.named(judged, effects),
+        verdict=rules.named(judged, effects),
         decision=decision,
         effects=effects,
         error=error,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,17 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.records import Array
 
-# Of 'before' and 'after': simulation and half width of its band, fitting part, then held-out part.
-Curves: TypeAlias = dict[str, tuple[Array, Array, Array, Array]]
-
 _RESAMPLES = 1000
 _NORMAL_95 = 1.959964
+
+
+class BandCurves(NamedTuple):
+    """Simulation of a structure and half width of its 95 % band [m], joined over records."""
+
+    fitted: Array
+    fitted_width: Array
+    held: Array
+    held_width: Array
 
 
 def bootstrap(
@@ -148,7 +154,7 @@ def verify(
     seed: int,
     line: Line | None = None,
     tried: int = 1,
-) -> tuple[HeldOutError, tuple[float, float], Curves]:
+) -> tuple[HeldOutError, tuple[float, float], tuple[BandCurves, BandCurves]]:
     """Compare both structures on data that decided nothing.
 
     A line found in the fitting part belongs to the noise here: its phase in the held-out part
@@ -158,8 +164,7 @@ def verify(
     of shams.
 
     Returns:
-        The error, the coverage of the 95 % bands before and after, and per side the joined
-        simulation and band half width of (fit, held) for pictures.
+        The error, and of before and after the coverage of the 95 % band, and curves for pictures.
     """
     rng = np.random.default_rng([seed, 3])
     noise = float(np.hypot(noise, line.rms)) if line else noise
@@ -177,12 +182,12 @@ def verify(
         halves[key] = _NORMAL_95 * np.sqrt(deviation**2 + floor**2)
         deviation = spread(fit, side.model, inner[key], side.draws, rng)[0]
         width = _NORMAL_95 * np.sqrt(deviation**2 + noise**2)
-        curves[key] = (inner[key], width, sims[key], halves[key])
+        curves[key] = BandCurves(inner[key], width, sims[key], halves[key])
     intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
     first, last = rms(errors['before']), rms(errors['after'])
     removable = first**2 - floor**2
     count = len(after.theta) - len(before.theta)
-    pair = fit.target - curves['before'][0], errors['before']
+    pair = fit.target - inner['before'], errors['before']
     sham = _sham(fit, held, before, pair, (count, tried), seed)
     without_zero = record_zero.without(held, errors['after'])
     per_record = tuple(
@@ -214,4 +219,4 @@ def verify(
     coverage = tuple(
         float(np.mean(np.abs(errors[key]) <= halves[key])) for key in ('before', 'after')
     )
-    return error, (coverage[0], coverage[1]), curves
+    return error, (coverage[0], coverage[1]), (curves['before'], curves['after'])

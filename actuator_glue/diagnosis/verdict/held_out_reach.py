@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.posterior.answer_posterior import Side
 from actuator_glue.diagnosis.posterior.likelihood import as_likely
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
-from actuator_glue.diagnosis.verdict.verdict import misses, takes_nothing
+from actuator_glue.diagnosis.verdict.rules import misses, takes_nothing
 from actuator_glue.inference.least_squares.data import LANES, Data
 from actuator_glue.inference.least_squares.fit import fit, rms
 from actuator_glue.inference.least_squares.space import sum_of_squares

@@ -1,4 +1,4 @@
-"""Curves of records for pictures: measured, and simulated before and after, with bands."""
+"""BandCurves of records for pictures: measured, and simulated before and after, with bands."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from actuator_glue.diagnosis.verdict.held_out_look import Curves
+from actuator_glue.diagnosis.verdict.held_out_look import BandCurves
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """Curves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
+    """BandCurves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
 
     `lower_*` and `upper_*` are the limits of the 95 % predictive band before and after (n,) [m].
     """
@@ -39,15 +39,20 @@ class Trace:
         return [slice(a, b) for a, b in pairwise([0, *edges.tolist(), len(self.time)])]
 
 
-def traces(data: Data, held_out: bool, curves: Curves) -> list[Trace]:
-    """Cut the joined curves into records for pictures."""
-    at = 2 if held_out else 0
+def traces(data: Data, held_out: bool, curves: tuple[BandCurves, BandCurves]) -> list[Trace]:
+    """Cut the joined curves of one part of the records, before and after, into records."""
+
+    def joined(side: BandCurves) -> tuple[Array, Array]:
+        if held_out:
+            return side.held, side.held_width
+        return side.fitted, side.fitted_width
+
+    (before, before_width), (after, after_width) = map(joined, curves)
     out = []
     for i, (record, mask, part) in enumerate(
         zip(data.records, data.masks, data.parts, strict=True)
     ):
-        b, wb = curves['before'][at][part], curves['before'][at + 1][part]
-        a, wa = curves['after'][at][part], curves['after'][at + 1][part]
+        b, wb, a, wa = before[part], before_width[part], after[part], after_width[part]
         out.append(
             Trace(
                 source=record.source or f'record {i + 1}',

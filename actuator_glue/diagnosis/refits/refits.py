@@ -78,14 +78,14 @@ def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
 
 
 @dataclass
-class Search:
+class Refits:
     """All structures tried on one data set, each refitted once.
 
     Attributes:
         data: the counted samples.
         scorer: noise and blocks; set once the base is fitted.
         entries: all effects, in the order in which they stand in a structure: those of the
-            catalogue, and learned terms for these data; `wider` searches share them.
+            catalogue, and learned terms for these data.
         names: effects that act on the mean response.
         each: refits candidates, several at a time if it can (the kernels release the
             interpreter lock).
@@ -149,13 +149,13 @@ class Search:
             self.described = True
         return [n for n, e in self.entries.items() if is_learned(e) and n not in self.names]
 
-    def wider(self, names: Sequence[str]) -> Search:
-        """Return a search that tries further effects; it knows all structures refitted so far."""
+    def wider(self, names: Sequence[str]) -> Refits:
+        """Return a copy that tries further effects; it knows all structures refitted so far."""
         own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
-        return replace(self, names=(*self.names, *names), **own)
+        return replace(self, names=(*self.names, *names), entries=dict(self.entries), **own)
 
     def take_over(
-        self, other: Search, final: Trial, singles: Sequence[Trial], matters: float
+        self, other: Refits, final: Trial, singles: Sequence[Trial], matters: float
     ) -> None:
         """Refit structures of another search of nearly the same target, from where they ended.
 
