@@ -139,7 +139,7 @@ def concluded(
     seen = at_recorded_rate.find(data, found, settings, line)
     chosen = found.final if found.final.effects else found.singles[0]
     generic = regression.compare(data, refits.scorer, found.base, chosen)
-    decision = decide(found, seen, data, settings, generic)
+    decision = decide(found, seen, settings, generic)
     return Conclusion(
         prepared, data, refits.scorer, line, found, seen, generic, decision, beam,
         found.steps,

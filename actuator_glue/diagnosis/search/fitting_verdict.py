@@ -1,4 +1,4 @@
-"""The verdict on the fitting part, and where the unexplained residual lies."""
+"""The verdict on the fitting part of the records."""
 
 from __future__ import annotations
 
@@ -6,17 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.learned.term import any_learned, is_learned
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.score.regression import Surrogate
-from actuator_glue.diagnosis.score.scorer import splits_of
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdicts import Verdict
-from actuator_glue.inference.least_squares.data import Data
-from actuator_glue.records import Array
 
 
 @dataclass(frozen=True)
@@ -33,7 +29,6 @@ class Decision:
         certainty: where structure remains, the share of it that the names explain and a generic
             regression does not explain better; else 1.
         limit: rms structure above which a model counts as unexplained [m].
-        remaining: where the unexplained residual lies, for the JSON.
     """
 
     verdict: Verdict
@@ -44,13 +39,11 @@ class Decision:
     left: float
     certainty: float
     limit: float
-    remaining: Json
 
 
 def decide(
     found: Selection,
     seen: tuple[Measured, ...],
-    data: Data,
     settings: Thresholds,
     surrogate: Surrogate,
 ) -> Decision:
@@ -87,7 +80,6 @@ def decide(
         left=left,
         certainty=_certainty(found, left, surrogate) if doubted else 1.0,
         limit=limit,
-        remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
 
 
@@ -107,47 +99,3 @@ def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:
     theirs = surrogate.structure_error**2 - found.noise**2
     generic = max(0.0, surrogate.error**2 - found.noise**2)
     return explained * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
-
-
-def _band(frequency: Array, excess: Array) -> list[float]:
-    """Return the band that holds the middle 80 % of the structure's power [Hz]."""
-    power = np.cumsum(np.maximum(excess, 0.0))
-    if power[-1] <= 0.0:
-        return []
-    low, high = np.searchsorted(power, [0.1 * power[-1], 0.9 * power[-1]])
-    return [round(float(frequency[low]), 2), round(float(frequency[high]), 2)]
-
-
-def remaining(data: Data, error: Array) -> Json:
-    """Say where in time, frequency, amplitude and velocity a residual (N,) lies, per record."""
-    rows = []
-    splits, errors = splits_of(data, error), data.split(error)
-    outputs = data.split(data.target - error)
-    for i, (record, part, e, y, t, period) in enumerate(
-        zip(data.records, splits, errors, outputs, data.times, data.periods, strict=True)
-    ):
-        excess = np.maximum(e**2 - part.noise**2, 0.0)
-        total = float(excess.sum()) or 1.0
-        cumulated = np.cumsum(excess)
-        inner = np.searchsorted(cumulated, [0.1 * cumulated[-1], 0.9 * cumulated[-1]])
-        velocity = np.abs(np.gradient(y, period))
-        slow = velocity < np.median(velocity)
-        amplitude = np.abs(y - np.median(y))
-        large = amplitude > np.median(amplitude)
-        order = np.argsort(amplitude)
-        ranked = np.cumsum(excess[order])
-        sizes = np.searchsorted(ranked, [0.1 * ranked[-1], 0.9 * ranked[-1]])
-        rows.append(
-            {
-                'source': record.source or f'record {i + 1}',
-                'stiffness': record.known_stiffness(),
-                'structure': part.structure,
-                'noise': part.noise,
-                'frequency_hz': _band(part.frequency, part.excess),
-                'time_s': [round(float(t[min(j, len(t) - 1)]), 2) for j in inner],
-                'displacement': [float(amplitude[order[min(j, len(y) - 1)]]) for j in sizes],
-                'share_at_low_velocity': round(float(excess[slow].sum()) / total, 3),
-                'share_at_large_displacement': round(float(excess[large].sum()) / total, 3),
-            }
-        )
-    return {'unit': 'm', 'records': rows}

@@ -49,12 +49,22 @@ def ended(effort: Effort) -> tuple[str, ...]:
 
 def of(
     decision: Decision,
+    remaining: Json,
     found: Selection,
     generic: Surrogate,
     stretches: dict[str, Homogeneity],
     experiments: Sequence[Experiment],
 ) -> tuple[str, ...]:
-    """Advice for a decision; `experiments` tell tied names apart, best first."""
+    """Advice for a decision.
+
+    Args:
+        decision: the verdict on the fitting part.
+        remaining: where its residual lies (telling/remaining.py).
+        found: effects with a mean response.
+        generic: a generic regression to compare them with.
+        stretches: sizes of each effect in halves of the records.
+        experiments: tests that tell tied names apart, best first.
+    """
     out = []
     entries = {e.name: e for e in decision.final.structure.entries}
     for name in decision.names:
@@ -94,7 +104,7 @@ def of(
             f'(limit {1e6 * decision.limit:.1f}); {nearest}; look where `remaining` points, '
             'and record the force channel and a second amplitude'
         )
-        out += [_where(row) for row in decision.remaining['records']]
+        out += [_where(row) for row in remaining['records']]
         out.append(
             f'a generic regression on {len(generic.features)} features of the motion '
             f'({", ".join(generic.features)}) leaves {1e6 * generic.error:.1f} um out of sample, '

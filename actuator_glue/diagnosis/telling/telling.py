@@ -12,6 +12,7 @@ from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.search import table
 from actuator_glue.diagnosis.telling import advice, companion_notes, response
 from actuator_glue.diagnosis.telling.next_experiment import Experiment, ranked
+from actuator_glue.diagnosis.telling.remaining import remaining
 from actuator_glue.diagnosis.telling.response import Response
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -57,7 +58,7 @@ def told(
     experiments = _experiments(drawn)
     learned = learned_term.described(final, data, sizes)
     contradicted = advice.contradicted(both.error, found.material)
-    still = _at_rest(drawn)
+    still, left = _at_rest(drawn), remaining(data, both.decision)
     return DiagnosisData(
         verdict=both.verdict,
         effects=both.effects,
@@ -71,7 +72,7 @@ def told(
             *([result.onset.sentence()] if result.onset else []),
             *advice.ended(result.effort),
             *(term.sentence() for term in learned),
-            *advice.of(both.decision, found, result.generic, both.stretches, experiments),
+            *advice.of(both.decision, left, found, result.generic, both.stretches, experiments),
             *contradicted,
             *advice.zeros(both.error, found.material),
             *_beside(drawn, final, bool(contradicted)),
@@ -105,7 +106,7 @@ def told(
         ),
         history=result.history,
         surrogate=result.generic.to_json(),
-        remaining=both.decision.remaining,
+        remaining=left,
         at_bound=pressed,
         effort=result.effort.share,
         preparation=tuple(prepared.remarks),
