@@ -73,9 +73,9 @@ TELLING: Final = 0.05
 # The same for another addition: an effect that just matters gains four nats.
 MATTERING: Final = 0.5
 
-# Nats that a description costs beyond its parameters and its choice, since a name says what to
-# mend: in the place of a name it must remove half of what matters.
-DESCRIPTION: Final = 1.0
+# Of what matters: a description must remove so much beyond the name it replaces, since a name says
+# what to mend.
+REPLACING: Final = 0.5
 
 # Of what matters: two effects that remove this share each remove what matters together.
 TOGETHER: Final = 0.5**0.5

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
-from actuator_glue.diagnosis.score.weights import log_weights
-from actuator_glue.diagnosis.search.table import kind
+from actuator_glue.diagnosis.score.weights import counted, log_weights
+from actuator_glue.diagnosis.search.table import additions
 from actuator_glue.diagnosis.thresholds import TELLING
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
@@ -136,12 +136,13 @@ def row_weights(rows: list[Json], material: float, telling: float = TELLING) -> 
     Args:
         rows: structures with `left_out` [m], `price` [nats], `scope` and `effects`.
         material: least rms error that matters [m].
-        telling: of that, the error that costs a nat between structures of a kind.
+        telling: of that, the error that costs a nat between structures with as many additions.
     """
+    left_out = [np.inf if r['left_out'] is None else r['left_out'] for r in rows]
     return log_weights(
-        [np.inf if r['left_out'] is None else r['left_out'] for r in rows],
+        [counted(e, r['effects'], material) for e, r in zip(left_out, rows, strict=True)],
         [r['price'] for r in rows],
-        [kind(r['effects'], r['scope']) for r in rows],
+        [additions(r['effects'], r['scope']) for r in rows],
         material,
         telling,
     )

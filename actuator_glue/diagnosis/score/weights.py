@@ -1,7 +1,6 @@
 """One weight for every structure: its error in units of what matters, and its price.
 
-Between structures of a kind, with as many additions (effects, another hold, an onset) and as many
-of them learned terms:
+Between structures with the same number of additions (effects, another hold, an onset):
 
     log w = -e^2 / s^2 - p - log(structures of as many that could have been tried)
 
@@ -11,25 +10,37 @@ nats of independent noise tell any two equations apart, and neither of them is t
 differences count in units of what matters. Nats answer one question only: is it there beyond
 chance.
 
-Whether there is another addition, or a description in the place of a name, is decided between the
-best structures of each kind with s = m / 2, m what matters: an effect that removes just m gains
-four nats. Otherwise effects that matter less would be reported as surely as they are there, and a
-description would replace a name, which says what to mend, where that matters to nobody.
+Whether there is another addition is decided between the best structures of each number with
+s = m / 2, m what matters: an effect that removes just m gains four nats. Otherwise effects that
+matter less would be reported as surely as they are there. The error of a learned term counts with
+half of what matters in addition: a name says what to mend.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from actuator_glue.diagnosis.learned.forms import descriptions
 from actuator_glue.diagnosis.learned.term import is_learned
-from actuator_glue.diagnosis.thresholds import DESCRIPTION, MATTERING, TELLING
+from actuator_glue.diagnosis.thresholds import MATTERING, REPLACING, TELLING
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
+
+
+def counted(left_out: float, effects: Iterable[str], material: float) -> float:
+    """Return the error of a structure that counts in its weight [m].
+
+    Args:
+        left_out: rms error of blocks left out [m].
+        effects: of the structure; a learned term that is another shape of a named cause counts as
+            that name.
+        material: least rms error that matters [m].
+    """
+    return math.hypot(left_out, math.sqrt(descriptions(effects)) * REPLACING * material)
 
 
 def log_weight(left_out: float, tells: float, cost: float) -> float:
@@ -46,7 +57,7 @@ def log_weight(left_out: float, tells: float, cost: float) -> float:
 def log_weights(
     left_out: Sequence[float],
     costs: Sequence[float],
-    kinds: Sequence[Hashable],
+    additions: Sequence[int],
     material: float,
     telling: float = TELLING,
 ) -> Array:
@@ -55,16 +66,16 @@ def log_weights(
     Args:
         left_out: rms error of blocks left out, of each [m].
         costs: price of each [nats].
-        kinds: of each, equal for structures of a kind.
+        additions: how much each adds to Eq. (2) as given.
         material: least rms error that matters [m].
-        telling: of that, the error that costs a nat between structures of a kind.
+        telling: of that, the error that costs a nat between structures with as many additions.
     """
     pairs = list(zip(left_out, costs, strict=True))
     named = np.array([log_weight(e, telling * material, cost) for e, cost in pairs])
     there = np.array([log_weight(e, MATTERING * material, cost) for e, cost in pairs])
     out = np.full(len(pairs), -np.inf)
-    for one in set(kinds):
-        own = np.array([k == one for k in kinds]) & np.isfinite(named)
+    for count in set(additions):
+        own = (np.array(additions) == count) & np.isfinite(named)
         if own.any():
             best = np.argmax(np.where(own, named, -np.inf))
             out[own] = there[best] + named[own] - np.logaddexp.reduce(named[own])
@@ -83,7 +94,7 @@ def price(structure: Structure, entries: Mapping[str, Effect], named: int) -> fl
     forms = max(sum(map(is_learned, entries.values())), terms)
     names = len(structure.entries) - terms
     chosen = choices(max(named, names), names) + choices(forms, terms)
-    return len(structure.parameters) + chosen + DESCRIPTION * descriptions(structure.effects)
+    return len(structure.parameters) + chosen
 
 
 def choices(count: int, taken: int) -> float:

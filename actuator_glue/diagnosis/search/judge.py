@@ -9,13 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_glue.diagnosis.learned.forms import descriptions
 from actuator_glue.diagnosis.refits.refits import Refits, by_score
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.score.weights import log_weight, log_weights, price
+from actuator_glue.diagnosis.score.weights import counted, log_weight, log_weights, price
 from actuator_glue.diagnosis.search.gains import removed
-from actuator_glue.diagnosis.search.table import kind
+from actuator_glue.diagnosis.search.table import additions
 from actuator_glue.diagnosis.thresholds import MATTERING, ROUGHLY, TELLING, TOGETHER, Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.fit import Fit
@@ -108,30 +107,31 @@ class Judge:
                 (as squares) to `TELLING` of what matters [m].
         """
         tells = math.hypot(TELLING * self.material, alike)
-        if descriptions(trial.effects) != descriptions(other.effects):
-            tells = MATTERING * self.material
         return self._log_weight(other, tells) - self._log_weight(trial, tells)
 
     def _log_weight(self, trial: Trial, tells: float) -> float:
-        refits, scorer = self.refits, self.refits.scorer
-        assert scorer is not None
+        refits = self.refits
         cost = price(trial.structure, refits.entries, len(refits.names))
-        return log_weight(scorer.left_out_error(trial.fit), tells, cost)
+        return log_weight(self._counted(trial), tells, cost)
+
+    def _counted(self, trial: Trial) -> float:
+        scorer = self.refits.scorer
+        assert scorer is not None
+        return counted(scorer.left_out_error(trial.fit), trial.effects, self.material)
 
     def heaviest(self, trials: Sequence[Trial]) -> Trial:
-        """Return the structure of the greatest weight among some of any kind.
+        """Return the structure of the greatest weight.
 
         While none of them is complete all are wrong, and a small difference tells nothing of them.
         """
-        refits, scorer = self.refits, self.refits.scorer
-        assert scorer is not None
+        refits = self.refits
         nearest = min(trials, key=lambda t: t.fit.rms)
         complete = self.left(nearest) < self.material
-        left_out = [scorer.left_out_error(t.fit) for t in trials]
+        errors = [self._counted(t) for t in trials]
         costs = [price(t.structure, refits.entries, len(refits.names)) for t in trials]
-        kinds = [kind(t.effects) for t in trials]
+        counts = [additions(t.effects) for t in trials]
         telling = TELLING if complete else MATTERING
-        return trials[int(np.argmax(log_weights(left_out, costs, kinds, self.material, telling)))]
+        return trials[int(np.argmax(log_weights(errors, costs, counts, self.material, telling)))]
 
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
         """Return the weights of an effect's rivals, and of no effect, relative to its own.

@@ -11,10 +11,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from actuator_glue.diagnosis.learned.forms import descriptions
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer
-from actuator_glue.diagnosis.score.weights import log_weights, price
+from actuator_glue.diagnosis.score.weights import counted, log_weights, price
 from actuator_glue.diagnosis.thresholds import MATTERING, TELLING
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
@@ -60,15 +59,13 @@ class Row(JsonObject):
         return self.scope, frozenset(self.effects)
 
 
-def kind(effects: Sequence[str], scope: str = '') -> tuple[int, int]:
-    """Return how much a structure adds to Eq. (2) as given, and how much of it only describes.
+def additions(effects: Sequence[str], scope: str = '') -> int:
+    """Return how much a structure adds to Eq. (2) as given: effects, the other hold, an onset.
 
-    Effects, the other hold and an onset are additions; one record's own setting is one of the
-    effects. A learned term that is another shape of a named cause counts as that name.
+    One record's own setting is one of the effects.
     """
     rest = scope.removeprefix(LINEAR).removeprefix(', ')
-    others = scope.startswith(LINEAR) + rest.startswith(SINCE)
-    return len(effects) + others, descriptions(effects)
+    return len(effects) + scope.startswith(LINEAR) + rest.startswith(SINCE)
 
 
 def rows(refits: Refits, scorer: Scorer) -> tuple[Row, ...]:
@@ -167,6 +164,6 @@ def outweighs(other: Row, told: Row, material: float, complete: bool) -> bool:
 
 
 def _weights(some: Sequence[Row], material: float, telling: float = TELLING) -> Array:
-    left_out, costs = zip(*((r.left_out, r.price) for r in some), strict=True)
-    kinds = [kind(r.effects, r.scope) for r in some]
-    return log_weights(left_out, costs, kinds, material, telling)
+    errors = [counted(r.left_out, r.effects, material) for r in some]
+    counts = [additions(r.effects, r.scope) for r in some]
+    return log_weights(errors, [r.price for r in some], counts, material, telling)
