@@ -18,6 +18,10 @@ _TOLERANCE = 0.25
 # such steps are gaps.
 _THROUGHOUT = 0.1
 _DECIMALS = 6  # most digits behind the point to which stamps may have been rounded
+# Rates closer than this are one rate to `clock_check`; a delay is off by the same share.
+_ONE_RATE = 0.01
+_TIES = 1e-6  # of a resolution: two stamps may be rounded from its two edges
+_ENDS = 500  # stamps of each end that are compared: those far apart tell a rate best
 
 
 def uniform_period(time: Array, where: str) -> float:
@@ -49,11 +53,9 @@ def uniform_period(time: Array, where: str) -> float:
         if steps[at] == 0.0:
             how, remedy = 'stands still', 'cut the record there'
             if steps.min() == 0.0 < steps.max():
-                near = f'{(len(time) - 1) / float(time[-1] - time[0]):.4g}'
                 remedy += (
                     '; where the times are only rounded or those of a log, and the samples are '
-                    f'even, --resample {near} (in Python `load(path, resample={near})`) takes an '
-                    'even clock in place of them'
+                    f'even, {_even_instead(time)}'
                 )
         raise InputError(
             f'{where}: time {how} at sample {at + 1} ({time[at]:.9g} s, then '
@@ -90,6 +92,91 @@ def uniform_period(time: Array, where: str) -> float:
             f'periods off an even clock; --resample {near_rate(time)} makes them even'
         )
     return near_whole_rate(period, len(time), rounded)
+
+
+def _even_instead(time: Array) -> str:
+    """Return how an even clock is taken in place of times that stand still, in words."""
+    allowed = allowed_rates(time)
+    near = None if allowed is None else told_rate(*allowed)
+    rate = 'HZ' if near is None else f'{near:.10g}'
+    how = f'--resample {rate} (in Python `load(path, resample={rate})`)'
+    how += ' takes an even clock in place of them'
+    if allowed is None:
+        return f'{how}; which one they do not tell: give the rate of the controller'
+    if near is None:
+        return (
+            f'{how}; they allow {between(*allowed)}, which is too wide for a proposal: give the '
+            'rate of the controller'
+        )
+    return f'{how}: they allow {between(*allowed)}'
+
+
+def between(low: float, high: float) -> str:
+    """Return an interval of rates [Hz] in words, with the digits that tell its ends apart."""
+    if high == np.inf:
+        return f'{low:.3g} Hz and more'
+    digits = 3 if high > 1.1 * low else min(int(np.ceil(2.0 - np.log10(high / low - 1.0))), 9)
+    return f'{low:.{digits}g} to {high:.{digits}g} Hz'
+
+
+def allowed_rates(time: Array) -> tuple[float, float] | None:
+    """Return the lowest and the highest rate of even samples that can have these stamps [Hz].
+
+    Stamps are taken to be late by less than what they are rounded to; those that cannot be, of a
+    log that is written in bursts say, by less than the longest step between two of them. Each
+    pair of stamps then bounds the time between its samples from below and from above.
+
+    Args:
+        time: stamps that never go back but may stand still, shape (n,) [s].
+
+    Returns:
+        None where no even clock gives such stamps, or nothing bounds its rate.
+    """
+    steps = np.diff(time)
+    new = np.flatnonzero(steps > 0.0)
+    if not new.size:
+        return None
+    # Only the first and the last sample of each stamp bound anything.
+    begins, ends = np.append(0, new + 1), np.append(new, len(time) - 1)
+    stamps = time[begins] - time[0]
+    for late in (rounding(time), float(steps.max())):
+        late *= 1.0 + _TIES
+        shortest, longest = 0.0, np.inf
+        for early, later in _compared(len(stamps)):
+            apart = stamps[later] - stamps[early]
+            outer, inner = ends[later] - begins[early], begins[later] - ends[early]
+            ahead = inner > 0
+            shortest = max(shortest, ((apart - late)[ahead] / inner[ahead]).max(initial=0.0))
+            some = outer > 0
+            longest = min(longest, ((apart + late)[some] / outer[some]).min(initial=np.inf))
+        if late > 0.0 and shortest < longest < np.inf:
+            return float(1.0 / longest), float(1.0 / shortest) if shortest else np.inf
+    return None
+
+
+def _compared(count: int) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return pairs of stamps to compare: each with itself and the next, the ends of both sides."""
+    every, near = np.arange(count), min(count, _ENDS)
+    early, later = np.meshgrid(every[:near], every[-near:])
+    ahead = early < later
+    return [(every, every), (every[:-1], every[1:]), (early[ahead], later[ahead])]
+
+
+def told_rate(low: float, high: float) -> float | None:
+    """Return the roundest rate between two that are one rate to any purpose; None if they are not.
+
+    Args:
+        low: least of them [Hz].
+        high: greatest of them [Hz].
+    """
+    if not high < (1.0 + _ONE_RATE) * low:
+        return None
+    middle = 0.5 * (low + high)
+    for digits in range(1, 17):
+        near = float(f'{middle:.{digits - 1}e}')
+        if low < near < high:
+            return near
+    return middle
 
 
 def near_rate(time: Array) -> str:

@@ -11,7 +11,14 @@ import numpy as np
 import scipy
 
 from actuator_glue.errors import InputError
-from actuator_glue.even_times import near_whole_rate, rounding, span
+from actuator_glue.even_times import (
+    allowed_rates,
+    between,
+    near_whole_rate,
+    rounding,
+    span,
+    told_rate,
+)
 from actuator_glue.records import Array
 
 By: TypeAlias = Literal['band-limited', 'lines']
@@ -61,6 +68,7 @@ class Resampled:
         noise: mean share of the variance of white noise that is left [1].
         late: root mean square by which stamps were off an even clock, where that was taken in
             place of them [s]; 0 where the stamps were taken.
+        clock: that clock, in words, with the rates that the stamps allow where they repeat.
         jitter: root mean square by which the times that were taken may still be off [s].
         moved: error from that jitter at the velocities of the measured displacement, root mean
             square [m].
@@ -77,6 +85,7 @@ class Resampled:
     error: dict[str, float]
     noise: float
     late: float
+    clock: str
     jitter: float
     moved: float
     cut: float
@@ -97,7 +106,7 @@ class Resampled:
         if self.late:
             line += (
                 f'; the samples are even and their stamps are not, by {1e3 * self.late:.2g} ms '
-                '(rms), so that an even clock was taken in place of them'
+                f'(rms), so that an even clock was taken in place of them, {self.clock}'
             )
         if self.moved:
             line += (
@@ -139,20 +148,22 @@ def resample_evenly(
 
     Raises:
         InputError: times that are no numbers, go back, or stand still where the samples are not
-            even; a gap; or a rate far from that of the samples.
+            even, or do not tell whose clock that is; a gap; or a rate far from that of the
+            samples.
     """
     if by not in get_args(By):
         raise InputError(f'resampling by {by!r} is unknown; use one of {", ".join(get_args(By))}')
     time = values['time']
     steps = np.diff(time)
     channels = {role: column for role, column in values.items() if role != 'time'}
-    even = _even_clock(time, channels, rate)
+    even, clock = _even_clock(time, channels, rate, where)
     if len(steps) < 3 or not np.isfinite(time).all() or not (steps.min() > 0.0 or len(even)):
         at = int((~(steps > 0.0)).argmax()) if len(steps) else 0
         raise InputError(
             f'{where}: time does not go up after sample {at}; sort the record, or cut it there'
         )
-    typical, mean = float(np.median(steps)), float(steps.mean())
+    typical = float(np.median(steps))
+    mean = float(np.mean(np.diff(even) if len(even) else steps))
     at = int(steps.argmax())
     if not len(even) and steps[at] > _LONGEST_STEP * typical:
         raise InputError(
@@ -179,6 +190,7 @@ def resample_evenly(
         else {},
         noise=_noise(partial(interpolate, taken[:_LOOK]), len(taken[:_LOOK]), rate),
         late=float(np.std(time - time[0] - even)) if len(even) else 0.0,
+        clock=clock,
         jitter=jitter,
         moved=jitter * _speed(taken, channels['measured']),
         cut=cut,
@@ -265,13 +277,21 @@ def _unlike(time: Array, column: Array) -> tuple[Array, Array]:
     return (column[2:-2] - between) / size, (values[2] - values[1]) / (near[2] - near[1])
 
 
-def _even_clock(time: Array, channels: dict[str, Array], rate: float) -> Array:
+def _even_clock(
+    time: Array, channels: dict[str, Array], rate: float, where: str
+) -> tuple[Array, str]:
     """Return even times where the samples are even and only their stamps are not; else nothing.
 
-    Such stamps stay near an even clock, and on that clock the command is smoother.
+    Such stamps stay near an even clock, and on that clock the command is smoother. The clock is
+    told in words.
+
+    Raises:
+        InputError: stamps that stand still and allow clocks far apart, none of them at the rate
+            that is asked for.
     """
+    none = np.empty(0), ''
     if len(time) < 16 or not np.isfinite(time).all() or np.diff(time).min() < 0.0:
-        return np.empty(0)
+        return none
     index = np.arange(len(time))
     period, first = np.polyfit(index, time - time[0], 1)
     off = time - time[0] - first - period * index
@@ -279,16 +299,45 @@ def _even_clock(time: Array, channels: dict[str, Array], rate: float) -> Array:
     # seconds are off theirs by a second at most.
     rounded = rounding(time)
     if period <= 0.0 or float(np.abs(off).max()) > max(_BESIDE * period, 1.1 * rounded):
-        return np.empty(0)
+        return none
+    if np.diff(time).min() == 0.0:
+        step, told = _repeated(time, rate, where)
+        return np.asarray(step * index), told
     step = near_whole_rate(float(period), len(time))
     # The rate that is asked for is the controller's where the stamps cannot tell the two apart.
     if abs(1.0 / rate - period) * len(time) < max(rounded, period):
         step = 1.0 / rate
     even = np.asarray(step * index)
     column = channels['command']
-    by_even = _smooth(even, column)
-    still = np.diff(time).min() == 0.0
-    return even if still or by_even < _BETTER * _smooth(time, column) else np.empty(0)
+    smoother = _smooth(even, column) < _BETTER * _smooth(time, column)
+    return (even, f'of {1.0 / step:.6g} Hz') if smoother else none
+
+
+def _repeated(time: Array, rate: float, where: str) -> tuple[float, str]:
+    """Return the period of even samples whose stamps stand still [s], and its clock in words.
+
+    The rate that is asked for is the controller's where the stamps allow it.
+
+    Raises:
+        InputError: they do not, and do not tell the rate either.
+    """
+    allowed = allowed_rates(time)
+    if allowed is None:
+        raise InputError(
+            f'{where}: time stands still, and no even clock gives such times; cut the record '
+            'where they are wrong, or log with the clock of the controller'
+        )
+    near = told_rate(*allowed)
+    told = f'(its times allow {between(*allowed)})'
+    if allowed[0] < rate < allowed[1]:
+        said = '' if near is not None else ', as asked for'
+        return 1.0 / rate, f'of {rate:.6g} Hz{said} {told}'
+    if near is None:
+        raise InputError(
+            f'{where}: its times allow a clock of {between(*allowed)}, and {rate:g} Hz is none '
+            'of them: resample to the rate of the controller'
+        )
+    return 1.0 / near, f'of {near:.6g} Hz {told}'
 
 
 def _smooth(time: Array, column: Array) -> float:

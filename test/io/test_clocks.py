@@ -10,7 +10,7 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
-from actuator_glue.even_times import uniform_period
+from actuator_glue.even_times import allowed_rates, told_rate, uniform_period
 from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.load import load_records
 from actuator_glue.io.look import look
@@ -140,3 +140,42 @@ def test_map_guesses_a_unit_of_time_that_gives_a_rate_of_a_test(tmp_path: Path) 
     for step, unit in ((2e-3, 's'), (1.0, 'ms'), (500.0, 'us'), (1e6, 'ns')):
         found = look(table(tmp_path / 'a.csv', NUMBER * step, 'Time,Command,Position'))
         assert propose(found).channels['time'].unit == unit
+
+
+@pytest.mark.parametrize(
+    ('rate', 'start', 'count', 'told'),
+    [
+        (1000.0, 0.0, 3000, 'resample 1000 .*: they allow 999.67 to 1001 Hz'),
+        (1000.0, 0.3, 1600, 'resample HZ .*; they allow 899 Hz and more, .* of the controller'),
+        (250.0, 0.123, 5001, 'resample 250 .*: they allow 249.947 to 250.053 Hz'),
+        (997.3, 0.2, 9000, 'resample 997.3 '),
+    ],
+)
+def test_whole_seconds_tell_the_rate_that_they_allow(
+    rate: float, start: float, count: int, told: str
+) -> None:
+    """Runs that are whole tell it however short the record; two parts of a second tell none."""
+    stamps = np.floor(1.7e9 + start + np.arange(count) / rate)
+    with pytest.raises(InputError, match=told):
+        uniform_period(stamps, 'x')
+
+
+@pytest.mark.parametrize('resolution', [1.0, 60.0, 1e-2, 1.0 / 64.0])
+def test_allowed_rates_hold_the_true_one(resolution: float) -> None:
+    """Rounded down or to the nearest, in seconds, minutes, hundredths or ticks of Windows."""
+    rng = np.random.default_rng(8)
+    for _ in range(50):
+        rate = float(rng.uniform(3.0, 40.0) / resolution)
+        at = rng.uniform(0.0, resolution) + np.arange(int(rng.integers(60, 900))) / rate
+        for rounded in (np.floor, np.round):
+            allowed = allowed_rates(resolution * rounded(at / resolution))
+            if allowed is not None:
+                assert allowed[0] <= rate <= allowed[1]
+                near = told_rate(*allowed)
+                assert near is None or near == pytest.approx(rate, rel=0.01)
+
+
+def test_stamps_of_no_even_clock_allow_no_rate() -> None:
+    """A sample every second, then a thousand at once."""
+    assert allowed_rates(np.append(np.arange(100.0), np.full(1000, 100.0))) is None
+    assert allowed_rates(np.zeros(10)) is None

@@ -111,6 +111,26 @@ def test_stamps_beside_even_samples_give_way_to_an_even_clock(late: str) -> None
     assert resample_evenly(channels(TIME, TIME, 1e-5), 27, where='x').late == 0.0
 
 
+def test_a_clock_that_the_stamps_rule_out_is_not_taken() -> None:
+    """Three whole seconds of 1 kHz are no 1.5 kHz: values stay where they were in time."""
+    true = np.arange(3000) / 1000.0
+    made = resample_evenly(channels(np.floor(true), true), 1500.0, where='x')
+    even = np.arange(len(made.values['command'])) / 1500.0
+    np.testing.assert_allclose(made.values['command'], command(even), atol=1e-9)
+    assert 'an even clock was taken in place of them, of 1000 Hz (its times allow' in made.told()
+
+
+def test_a_clock_that_the_stamps_leave_open_is_the_one_that_is_asked_for() -> None:
+    """Within what they allow; anything else is no answer."""
+    true = 0.3 + np.arange(1600) / 1000.0
+    stamps = np.floor(true)
+    made = resample_evenly(channels(stamps, true), 1000.0, where='x')
+    np.testing.assert_allclose(made.values['command'], command(true), atol=1e-9)
+    assert 'of 1000 Hz, as asked for (its times allow 899 Hz and more)' in made.told()
+    with pytest.raises(InputError, match='allow a clock of 899 Hz and more, and 700 Hz is none'):
+        resample_evenly(channels(stamps, true), 700.0, where='x')
+
+
 def test_what_the_stamps_are_worth_is_told_in_micrometres() -> None:
     """Samples at uneven times, stamped 2 ms beside: noise where the piston moves."""
     stamps = TIME + np.random.default_rng(7).normal(0.0, 2e-3, COUNT)
