@@ -4,6 +4,7 @@ import dataclasses
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,9 +118,10 @@ def test_a_diagnosis_is_kept_and_shown(
     record: ag.Record, posterior: ag.Calibration, tmp_path: Path
 ) -> None:
     """The same for a diagnosis, which may begin with what a calibration knew."""
-    found = ag.diagnose(record, prior=posterior, prior_age=60.0)
+    other = replace(posterior, sketches=())  # as if of another test
+    found = ag.diagnose(record, prior=other, prior_age=60.0)
     assert found.prior is not None and found.prior.source == 'a calibration'
-    assert not found.prior.contradicted  # it is the same record's
+    assert not found.prior.contradicted  # it is the same machine's
     assert found.to_json()['tracking'][0]['predicted']['J2']['median'] > 0.0
     again = ag.Diagnosis.load(found.save(tmp_path / 'diagnosis.npz'))
     assert json.dumps(again.to_json()) == json.dumps(found.to_json())

@@ -1,6 +1,7 @@
 """Paths and numbers of every usual type are taken by every public function, or refused by name."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import timedelta
 from decimal import Decimal
 from fractions import Fraction
@@ -98,8 +99,9 @@ def test_diagnose_takes_files(
 
     monkeypatch.setattr('actuator_glue.api.diagnosis.core.diagnose', diagnosed)
     age = timedelta(hours=1)
+    other = replace(posterior, sketches=())  # as if of another test
     with pytest.raises(InterruptedError):
-        api.diagnose([str(file)], Named(file), seed=None, prior=posterior, prior_age=age)
+        api.diagnose([str(file)], Named(file), seed=None, prior=other, prior_age=age)
     for (given,) in (seen['records'], seen['held']):
         np.testing.assert_array_equal(given.measured, record.measured)
     assert type(seen['seed']) is int and seen['before'].prior.age_s == 3600.0

@@ -26,6 +26,7 @@ from actuator_glue.diagnosis.verdict.residual_structure import residual_structur
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.clean import clean, common_initial
 from actuator_glue.hygiene.impulse_removal import despiked
+from actuator_glue.hygiene.repeats import refuse_known, sketch
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
@@ -83,6 +84,8 @@ def calibrate(
     if settle is None:
         settle = SETTLE if initial == 'measured' else 0.0
     given_before = given_prior(options.prior, options.drift, options.prior_age)
+    if given_before is not None:
+        refuse_known(tests, given_before.sketches, given_before.source)
     started = time.perf_counter()
     with (
         shown('calibrate', options.evaluations, False if callable(progress) else progress) as bar,
@@ -158,6 +161,7 @@ def calibrate(
         records=tuple(cleaned),
         tracking=records_tracking(chains.posterior(), model.names, structure, cleaned),
         residual=left_over(model, chains.best, cleaned, initial, settle),
+        sketches=tuple(sketch(r) for r in tests),
     )
 
 

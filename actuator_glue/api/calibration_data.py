@@ -53,6 +53,8 @@ class CalibrationData:
         tracking: how the actuator follows the command of each record.
         residual: what the best draw leaves, as noise of which neighbouring samples are correlated;
             None where too few samples are left, and in files of earlier versions.
+        sketches: stretches of what each record measured, by which a later calibration knows it
+            again, each of shape (m, n) [m]; empty in files of earlier versions.
     """
 
     parameters: dict[str, Marginal]
@@ -82,6 +84,7 @@ class CalibrationData:
     force: tuple[RecordForce, ...] = ()
     structure: ResidualStructure | None = None
     residual: ResidualModel | None = None
+    sketches: tuple[Array, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

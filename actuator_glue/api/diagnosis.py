@@ -35,6 +35,7 @@ from actuator_glue.diagnosis.verdict.first_look import FirstLook
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
+from actuator_glue.hygiene.repeats import refuse_known
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.motion import METRES, speaking, spoken
 from actuator_glue.records import Record
@@ -364,6 +365,9 @@ def diagnose(
         raise InputError(
             f'holdout: moves in {held[0].motion}, and the records move in {given[0].motion}'
         )
+    before = given_prior(options.prior, options.drift, options.prior_age)
+    if before is not None:
+        refuse_known([*given, *held], before.sketches, before.source)
     with (
         # Our matrices are small and our own threads use the cores: those of the linear algebra on
         # top would only wait for each other (1.5 times the time, twice that of the processor).
@@ -383,9 +387,7 @@ def diagnose(
                 use_force=options.use_force,
                 effort=options.effort * Thresholds().effort,
             ),
-            before=Before(
-                given_prior(options.prior, options.drift, options.prior_age), remembered
-            ),
+            before=Before(before, remembered),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     if found.complete and (told := doubts(found, [*given, *held])):

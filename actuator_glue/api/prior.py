@@ -56,4 +56,5 @@ def given_prior(
     found = calibration_given(earlier)
     left = found.structure
     doubt = '' if left is None or left.intervals_hold else left.amounts()
-    return GivenPrior(found.carried().drifted(Drift(drift), since), source, drift, since, doubt)
+    known = found.carried().drifted(Drift(drift), since)
+    return GivenPrior(known, source, drift, since, doubt, found.sketches)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -50,31 +48,6 @@ def check(record: Record, number: int = 1) -> None:
         )
     _follows(record)
     _pushes(record)
-
-
-def refuse_repeats(records: Sequence[Record], held: Sequence[Record] = ()) -> None:
-    """Refuse records that hold the same samples: each would count twice, or judge itself.
-
-    Raises:
-        InputError: two records of the same command and measured displacement.
-    """
-    seen: dict[bytes, int] = {}
-    for i, record in enumerate((*records, *held)):
-        samples = hashlib.sha256(record.command.data)
-        samples.update(record.measured.data)
-        first = seen.setdefault(samples.digest(), i)
-        if first == i:
-            continue
-        names = where((*records, *held)[first], first + 1), where(record, i + 1)
-        if first < len(records) <= i:
-            raise InputError(
-                f'{names[1]}, held out, holds the same samples as {names[0]}, which is fitted: '
-                'it would judge itself; hold out another record, or none'
-            )
-        raise InputError(
-            f'{names[1]} holds the same samples as {names[0]} and would count twice; give each '
-            'record once'
-        )
 
 
 def _displaces(record: Record) -> None:

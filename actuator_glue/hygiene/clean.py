@@ -9,7 +9,8 @@ import numpy as np
 import scipy
 
 from actuator_glue.hygiene import glitches, slow_channel
-from actuator_glue.hygiene.checks import check, refuse_repeats, where
+from actuator_glue.hygiene.checks import check, where
+from actuator_glue.hygiene.repeats import refuse_repeats
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from actuator_glue.inference.carried import Carried
+from actuator_glue.records import Array
 
 # Prior predictive p-value below which records and prior do not belong together.
 CONTRADICTED = 1e-3
@@ -68,6 +69,7 @@ class GivenPrior:
     Attributes:
         carried: draws, drifted to the time of the records.
         source, drift, age_s, doubt: as in `PriorUse`.
+        sketches: of the records it was made of, as in `hygiene.repeats`; empty where not known.
     """
 
     carried: Carried
@@ -75,6 +77,7 @@ class GivenPrior:
     drift: float
     age_s: float
     doubt: str = ''
+    sketches: tuple[Array, ...] = ()
 
     def used(self, components: int, quality: float, p_value: float) -> PriorUse:
         """Return how it was used."""

@@ -79,7 +79,7 @@ def test_without_a_held_out_record_blocks_are_set_aside() -> None:
 
 def test_a_record_that_begins_in_motion_starts_from_its_samples() -> None:
     """The first second then only lets the state be forgotten."""
-    data = prepare([GOOD.slice(1000, 5000)], [GOOD]).fit
+    data = prepare([GOOD.slice(1000, 5000)], [replace(GOOD, measured=0.95 * U)]).fit
     assert data.initials == ('measured',)
     assert not data.masks[0][:256].any()
 

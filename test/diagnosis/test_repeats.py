@@ -1,0 +1,105 @@
+"""Samples given twice: copies in fewer digits, parts, priors; tests of one command are none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.errors import InputError
+from actuator_glue.hygiene.repeats import refuse_known, refuse_repeats, sketch
+from actuator_glue.records import Array, Record
+
+RATE = 256.0
+T = np.arange(0, 20, 1 / RATE)
+U = 2e-3 * np.sin(np.pi / 8 * T**2)
+
+
+def trial(seed: int, noise: float = 5e-6) -> Record:
+    """Return a test of one command on one machine, its noise its own."""
+    measured = 0.9 * U + noise * np.random.default_rng(seed).standard_normal(len(U))
+    return Record(U, measured, 1 / RATE, stiffness=0.0, source=f'test {seed}')
+
+
+ONE = trial(1)
+
+
+def digits(values: Array, count: int, unit: float = 1e-3) -> Array:
+    """Return values as a table of so many significant digits has them [m]."""
+    return unit * np.array([float(f'{v / unit:.{count}g}') for v in values])
+
+
+@pytest.mark.parametrize(
+    'copied',
+    [
+        lambda y: digits(y, 3),
+        lambda y: digits(y, 5),
+        lambda y: digits(y, 4, 0.0254),
+        lambda y: 1e-5 * np.round(y / 1e-5),
+        lambda y: 1e-3 * (1e3 * y).astype(np.float32).astype(np.float64),
+        lambda y: y[1000:4000],
+        lambda y: digits(y, 4)[2000:],
+    ],
+    ids=['3 digits', '5 digits', 'inches', '10 um', 'single', 'a part', 'the end, 4 digits'],
+)
+def test_a_copy_is_known_by_its_noise(copied: Callable[[Array], Array]) -> None:
+    """However it was written, in whatever order, fitted or held out."""
+    measured = copied(ONE.measured)
+    copy = replace(ONE.slice(0, len(measured)), measured=measured, source='copy')
+    for pair in ([ONE, copy], [copy, ONE]):
+        with pytest.raises(InputError, match=r'holds the same samples as .* would count twice'):
+            refuse_repeats(pair)
+    with pytest.raises(InputError, match=r'copy, held out, .* it would judge itself'):
+        refuse_repeats([trial(2), ONE], [copy])
+    with pytest.raises(InputError, match=r'the prior from monday\.npz was made'):
+        refuse_known([trial(2), copy], [sketch(ONE)], 'monday.npz')
+
+
+def test_every_second_sample_is_no_other_test() -> None:
+    """At half the rate."""
+    thin = replace(ONE.slice(0, 2560), measured=ONE.measured[1::2], period=2 / RATE)
+    with pytest.raises(InputError, match='would count twice'):
+        refuse_repeats([thin, ONE])
+
+
+@pytest.mark.parametrize('noise', [1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize('step', [0.0, 2e-7, 5e-6])
+def test_a_command_that_is_repeated_is_another_test(noise: float, step: float) -> None:
+    """The same motion with fresh noise, whatever the digits and the converter's step."""
+    if step > 5.0 * noise:
+        pytest.skip('a converter that reads no noise at all says nothing')
+    tests = []
+    for seed in (1, 2):
+        test = trial(seed, noise)
+        if step:
+            test = replace(test, measured=step * np.round(test.measured / step))
+        tests.append(test)
+    few = replace(tests[1], measured=digits(tests[1].measured, 4))
+    for other in (tests[1], few):
+        refuse_repeats([tests[0], other])
+        refuse_known([other], [sketch(tests[0])], 'monday.npz')
+
+
+def test_readings_that_rest_are_no_copy() -> None:
+    """A converter that shows three values at rest, in both tests, before other motion."""
+    rest = 5e-6 * np.round(np.random.default_rng(3).standard_normal(1024) / 3.0)
+    made = [
+        replace(
+            ONE.slice(0, 3024),
+            command=np.append(0 * rest, scale * U[:2000]),
+            measured=np.append(rest, trial(seed).measured[:2000] * scale),
+        )
+        for seed, scale in ((4, 1.0), (5, 0.8))
+    ]
+    refuse_repeats(made)
+
+
+def test_a_prior_of_the_same_records_is_refused() -> None:
+    """By calibration and diagnosis, also from the file it was saved to."""
+    record = ag.simulate(ag.Command(rate=100.0, duration=8.0), stiffness=250e3, seed=4)
+    posterior = ag.calibrate(record, evaluations=8000, seed=1)
+    few = replace(record, measured=digits(record.measured, 5))
+    for use in (ag.calibrate, ag.diagnose):
+        with pytest.raises(InputError, match='the prior from a calibration was made'):
+            use(few, prior=posterior)
