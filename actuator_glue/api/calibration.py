@@ -27,6 +27,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.hygiene.clean import clean, common_initial
 from actuator_glue.hygiene.impulse_removal import despiked
 from actuator_glue.hygiene.repeats import refuse_known, sketch
+from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
@@ -122,7 +123,9 @@ def calibrate(
     structure = Structure(model.effects)
     best = chains.best[: len(structure.names)]
     left = residual_structure(cleaned, initial, settle, structure, best)
-    unlike = () if left is None else unlike_rest(tests, left.noise_m)
+    doubtful = suspicions(tests)
+    if left is not None:
+        doubtful += unlike_rest(tests, left.noise_m)
     forces: tuple[RecordForce, ...] = ()
     if options.use_force:
         forces = force_errors(model, chains.best, cleaned, initial, settle)
@@ -134,7 +137,7 @@ def calibrate(
         error=fit,
         structure=left,
         at_bound=at_bound,
-        problems=tuple(judgement.problems(at_bound, parameters, fit, prior, left, unlike)),
+        problems=tuple(judgement.problems(at_bound, parameters, fit, prior, left, doubtful)),
         notes=(
             *judgement.remarks(
                 cleaned, parameters, chains.posterior(), converged, at_bound, prior

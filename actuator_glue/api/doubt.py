@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from actuator_glue.api.judgement import APART
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.verdict.rules import excused
+from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.records import Record
 
@@ -34,4 +35,4 @@ def doubts(found: DiagnosisData, records: Sequence[Record]) -> tuple[str, ...]:
             f'no posterior was reached: chains have not met (R-hat {found.rhat:.3g}, above '
             f'{APART}); give more --effort, or another test'
         )
-    return (*unlike_rest(records, found.error.noise_floor), *told)
+    return (*suspicions(records), *unlike_rest(records, found.error.noise_floor), *told)

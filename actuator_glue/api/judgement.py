@@ -31,7 +31,7 @@ def problems(
     fit: FitError,
     prior: PriorUse | None = None,
     left: ResidualStructure | None = None,
-    unlike: Sequence[str] = (),
+    doubtful: Sequence[str] = (),
 ) -> list[str]:
     """Return why a posterior must not be used as it stands, one line each; empty where it may.
 
@@ -41,7 +41,7 @@ def problems(
         fit: error of the best draw.
         prior: what was known before, if anything.
         left: structure and noise of the residual, where they can be told.
-        unlike: of records whose noise cannot be noise, see `unlike_rest`.
+        doubtful: of records that cannot be what they say, see `suspicions` and `unlike_rest`.
     """
     told = []
     apart = {n: p.rhat for n, p in parameters.items() if not p.rhat <= APART}
@@ -69,7 +69,7 @@ def problems(
     if structure is not None and left is not None:
         # If the set-up is wrong, the other problems follow from it.
         told.insert(0 if left.setup else len(told), structure)
-    told += unlike
+    told += doubtful
     if prior is not None and prior.contradicted:
         told.append(prior.contradiction())
     for p in found:

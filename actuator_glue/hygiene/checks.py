@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -19,6 +19,7 @@ _FASTEST = 10.0  # m/s: no servo-hydraulic actuator follows
 # off by 10 and more.
 _OFF = 5.0
 _TELLING = 0.8  # share of the force's variance that displacement and acceleration must explain
+_SURE = 5.0  # standard deviations: noise of a load cell is not quite white
 _SEPARATE = 0.1  # share of the displacement's variance that acceleration must leave
 
 
@@ -143,17 +144,56 @@ def pull(record: Record) -> float | None:
     return None if found is None else found[0]
 
 
+def most_push(record: Record) -> float | None:
+    """Return the most that force over displacement can be where that explains no force [N/m].
+
+    None where it explains the force, where a mass may hide it, and without a force that moves.
+    """
+    found = _regressed(record)
+    if found is None or found.explained or not found.separate:
+        return None
+    return abs(found.weight) + _SURE * found.error
+
+
 def _push(record: Record) -> tuple[float, float, bool] | None:
     """Return what displacement and acceleration say of the force; None if they do not explain it.
 
     That is force over displacement [N/m], the spread of the displacement over that of the force
     [m/N], and whether a mass could be told apart.
     """
+    found = _regressed(record)
+    if found is None or not found.explained:
+        return None
+    return found.weight, found.size, found.separate
+
+
+@dataclass(frozen=True, slots=True)
+class _Regressed:
+    """A force by displacement and acceleration.
+
+    Attributes:
+        weight: force over displacement [N/m].
+        error: its standard deviation, of white noise [N/m].
+        size: spread of the displacement over that of the force [m/N].
+        separate: a mass could be told apart.
+        explained: the two explain the force.
+    """
+
+    weight: float
+    error: float
+    size: float
+    separate: bool
+    explained: bool
+
+
+def _regressed(record: Record) -> _Regressed | None:
+    """Return what displacement and acceleration say of the force; None where one does not move."""
     if record.force is None or float(np.ptp(record.force)) == 0.0:
         return None
     x, acceleration = _slow(record.measured, record)
     force, _ = _slow(record.force, record)
-    if len(x) < 10 or float(acceleration @ acceleration) == 0.0:
+    moves = min(float(acceleration @ acceleration), float(force @ force)) > 0.0
+    if len(x) < 10 or not moves:
         return None
     # A mass's force must not pass for a specimen's, nor be subtracted from it where both look
     # alike.
@@ -161,7 +201,12 @@ def _push(record: Record) -> tuple[float, float, bool] | None:
     separate = 1.0 - shared > _SEPARATE
     basis = np.stack([x, acceleration]) if separate else x[None]
     weights, *_ = np.linalg.lstsq(basis.T, force, rcond=None)
-    left = force - weights @ basis
-    if float(left @ left) > (1.0 - _TELLING) * float(force @ force):
-        return None
-    return float(weights[0]), float(x.std() / force.std()), separate
+    left = float(np.sum((force - weights @ basis) ** 2))
+    free = max(len(x) - len(basis), 1)
+    return _Regressed(
+        weight=float(weights[0]),
+        error=float(np.sqrt(left / free * np.linalg.inv(basis @ basis.T)[0, 0])),
+        size=float(x.std() / force.std()),
+        separate=separate,
+        explained=left <= (1.0 - _TELLING) * float(force @ force),
+    )

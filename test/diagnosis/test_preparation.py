@@ -9,6 +9,7 @@ from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import check
 from actuator_glue.hygiene.clean import initial_state
+from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.records import Record
 
 T = np.arange(0, 20, 1 / 256)
@@ -136,3 +137,21 @@ def test_a_force_that_says_nothing_stops_nobody() -> None:
     check(replace(pushed(250e3), force=np.full(len(T), 150.0)))
     noise = 1e3 * np.random.default_rng(2).standard_normal(len(T))
     check(replace(GOOD, stiffness=250e3, force=noise))
+
+
+def test_a_specimen_that_no_force_shows_is_told() -> None:
+    """Two newtons of noise beside 250 kN/m, or newtons taken for kilonewtons; nothing else is."""
+    noise = 2.0 * np.random.default_rng(2).standard_normal(len(T))
+    (told,) = suspicions([GOOD, pushed(250e3, 50.0), replace(GOOD, stiffness=250e3, force=noise)])
+    assert told.startswith('good: the specimen stiffness is given as 2.5e+05 N/m, and the force')
+    loud = pushed(250e3)
+    drowned = replace(loud, force=1e-3 * np.asarray(loud.force) + noise)
+    assert suspicions([drowned]) and not suspicions([replace(drowned, stiffness=100.0)])
+    silent = replace(GOOD, stiffness=250e3, force=np.full(len(T), 150.0))
+    deaf = replace(GOOD, stiffness=250e3, force=5e4 * noise)  # it could not show a specimen
+    free = replace(GOOD, force=noise)
+    assert not suspicions([silent, deaf, free, replace(GOOD, stiffness=250e3)])
+    t = T[:2560]
+    sine = np.sin(2 * np.pi * 2.0 * t)  # a mass may carry all that the specimen pushes
+    steady = Record(2e-3 * sine, 1.8e-3 * sine, 1 / 256, stiffness=250e3, force=noise[:2560])
+    assert not suspicions([steady])

@@ -1,0 +1,32 @@
+"""What does not forbid to fit a record, and forbids to believe the result before it is checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from actuator_glue.hygiene.checks import most_push, where
+from actuator_glue.records import Record
+
+# Times a force must fall short of what the stated stiffness asks for, as where a force contradicts
+# it: a specimen that yields is off by a factor of 2 or 3.
+_SHORT = 5.0
+
+
+def suspicions(records: Sequence[Record]) -> tuple[str, ...]:
+    """Return a sentence on each record whose set-up is doubtful, and what to check.
+
+    Args:
+        records: as they were measured, with the stiffness that was given.
+    """
+    out = []
+    for i, record in enumerate(records):
+        most = most_push(record)
+        if record.stiffness and most is not None and _SHORT * most < record.stiffness:
+            out.append(
+                f'{where(record, i + 1)}: the specimen stiffness is given as '
+                f'{record.stiffness:.3g} N/m, and the force channel shows no specimen: of force '
+                f'that follows the displacement there are at most {most:.2g} N/m; check whether '
+                'the test was free (stiffness 0), the load cell connected, and the unit of its '
+                'channel'
+            )
+    return tuple(out)
