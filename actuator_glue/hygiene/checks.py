@@ -18,6 +18,8 @@ _FASTEST = 10.0  # m/s: no servo-hydraulic actuator follows
 # A specimen that yields or hardens is off its stiffness by a factor of 2 or 3; a wrong unit is
 # off by 10 and more.
 _OFF = 5.0
+# N/m: pushes back with 20 N over 10 mm, less than the seals of a piston rub.
+_SOFTEST = 2e3
 _TELLING = 0.8  # share of the force's variance that displacement and acceleration must explain
 _SURE = 5.0  # standard deviations: noise of a load cell is not quite white
 _SEPARATE = 0.1  # share of the displacement's variance that acceleration must leave
@@ -32,8 +34,8 @@ def check(record: Record, number: int = 1) -> None:
     """Refuse a record that cannot be fitted.
 
     Raises:
-        InputError: stiffness not known, or at odds with the force; nothing moves, units that do
-            not match, or channels that are swapped or of opposite sign.
+        InputError: stiffness not known, at odds with the force or of no specimen; nothing
+            moves, units that do not match, or channels that are swapped or of opposite sign.
     """
     name = where(record, number)
     record = replace(record, source=name)
@@ -49,6 +51,7 @@ def check(record: Record, number: int = 1) -> None:
         )
     _follows(record)
     _pushes(record)
+    _resists(record)
 
 
 def _displaces(record: Record) -> None:
@@ -135,6 +138,21 @@ def _pushes(record: Record) -> None:
             f'{record.source}: force over displacement is {seen:.3g} N/m, but the specimen '
             f'stiffness is given as {stated:.3g} N/m; check it (--stiffness, in N/m and in the '
             'order of the records) and the units of the force channel'
+        )
+
+
+def _resists(record: Record) -> None:
+    """Refuse a stiffness below that of any specimen: one in N/mm, kN/mm or kN/m.
+
+    Raises:
+        InputError: the actuator could not tell it from none.
+    """
+    stated = record.known_stiffness()
+    if 0.0 < stated < _SOFTEST:
+        raise InputError(
+            f'{record.source}: the specimen stiffness is given as {stated:.4g} N/m, and no '
+            f'specimen is softer than {_SOFTEST:g} N/m, which an actuator cannot tell from none; '
+            'check its unit: it is in N/m (250 kN/m or 250 N/mm is 250e3), 0 for a free actuator'
         )
 
 

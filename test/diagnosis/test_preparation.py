@@ -155,3 +155,12 @@ def test_a_specimen_that_no_force_shows_is_told() -> None:
     sine = np.sin(2 * np.pi * 2.0 * t)  # a mass may carry all that the specimen pushes
     steady = Record(2e-3 * sine, 1.8e-3 * sine, 1 / 256, stiffness=250e3, force=noise[:2560])
     assert not suspicions([steady])
+
+
+@pytest.mark.parametrize('typed', [0.25, 50.0, 250.0, 1000.0])
+def test_a_stiffness_of_no_specimen_is_refused(typed: float) -> None:
+    """250 kN/m typed in kN/m, N/mm or kN/mm; a soft specimen and none are taken."""
+    with pytest.raises(InputError, match=rf'good: the specimen .* {typed:g} N/m.* its unit'):
+        prepare([replace(GOOD, stiffness=typed)], [])
+    for taken in (0.0, 2e3, 50e3):
+        check(replace(GOOD, stiffness=taken))
