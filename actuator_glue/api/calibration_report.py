@@ -240,7 +240,9 @@ def next_command(found: CalibrationData) -> str:
         return command('calibrate', tests, *effects, *other)
     if left is not None and left.other_fits:
         return command('calibrate', tests, *effects, '--hold', left.other_hold)
-    if pressed and left is not None and left.intervals_hold:
+    # With any other problem, a wider bound would only fit what is wrong.
+    only_pressed = 0 < len(pressed) == len(found.problems)
+    if only_pressed and left is not None and left.intervals_hold:
         wider = []
         for p in pressed:
             low, high = found.parameters[p.name].bounds

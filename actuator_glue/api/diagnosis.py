@@ -36,6 +36,7 @@ from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
 from actuator_glue.hygiene.repeats import refuse_known
+from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.motion import METRES, speaking, spoken
 from actuator_glue.records import Record
@@ -390,8 +391,10 @@ def diagnose(
             before=Before(before, remembered),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
-    if found.complete and (told := doubts(found, [*given, *held])):
-        values['verdict'] = 'unexplained'
+    every = [*given, *held]
+    told = doubts(found, every) if found.complete else suspicions(every)
+    if told:
+        values['verdict'] = 'unexplained' if found.complete else found.verdict
         values['advice'] = (*told, *found.advice)
     values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance([*given, *held], options.seed)

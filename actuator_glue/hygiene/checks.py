@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.errors import InputError
+from actuator_glue.hygiene.slow_gain import slow_gain, told
 from actuator_glue.records import Array, Record
 from actuator_glue.velocity_command import is_velocity
 
@@ -20,6 +21,8 @@ _FASTEST = 10.0  # m/s: no servo-hydraulic actuator follows
 _OFF = 5.0
 # N/m: pushes back with 20 N over 10 mm, less than the seals of a piston rub.
 _SOFTEST = 2e3
+# Amplitude of slow motion that the most leakage of Table 3 leaves under 1 MN/m.
+_DROOPS = 0.08
 _TELLING = 0.8  # share of the force's variance that displacement and acceleration must explain
 _SURE = 5.0  # standard deviations: noise of a load cell is not quite white
 _SEPARATE = 0.1  # share of the displacement's variance that acceleration must leave
@@ -50,6 +53,7 @@ def check(record: Record, number: int = 1) -> None:
             'the units of its channel and of time (metres and seconds are expected)'
         )
     _follows(record)
+    _reaches(record)
     _pushes(record)
     _resists(record)
 
@@ -97,6 +101,22 @@ def _follows(record: Record) -> None:
             f'{record.source}: the measured displacement leads the command by '
             f'{1e3 * lead:.0f} ms; check whether the two channels are swapped, or their clocks '
             'apart'
+        )
+
+
+def _reaches(record: Record) -> None:
+    """Refuse channels of two units: slow motion is followed nearly all the way.
+
+    Raises:
+        InputError: a fifth of it and less, or five times as much; under a specimen less than
+            leakage explains.
+    """
+    gain = slow_gain(record)
+    least = _DROOPS if record.known_stiffness() else 1.0 / _OFF
+    if gain is not None and not least < gain < _OFF:
+        raise InputError(
+            f'{record.source}: {told(gain)}; check the units of both channels (`unit` in a '
+            'channel map, or in the name of the column)'
         )
 
 

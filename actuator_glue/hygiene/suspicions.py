@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from actuator_glue.hygiene.checks import most_push, where
+from actuator_glue.hygiene.slow_gain import slow_gain, told
 from actuator_glue.records import Record
 
 # Times a force must fall short of what the stated stiffness asks for, as where a force contradicts
 # it: a specimen that yields is off by a factor of 2 or 3.
 _SHORT = 5.0
+# Amplitudes of slow motion that a specimen, leakage and a transducer's factor give together.
+_LEAST, _MOST = 0.6, 1.6
 
 
 def suspicions(records: Sequence[Record]) -> tuple[str, ...]:
@@ -20,6 +23,12 @@ def suspicions(records: Sequence[Record]) -> tuple[str, ...]:
     """
     out = []
     for i, record in enumerate(records):
+        gain = slow_gain(record)
+        if gain is not None and not _LEAST < gain < _MOST:
+            out.append(
+                f'{where(record, i + 1)}: {told(gain)}; check the units and the calibration of '
+                'both channels'
+            )
         most = most_push(record)
         if record.stiffness and most is not None and _SHORT * most < record.stiffness:
             out.append(

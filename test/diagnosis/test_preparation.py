@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.errors import InputError
@@ -164,3 +165,38 @@ def test_a_stiffness_of_no_specimen_is_refused(typed: float) -> None:
         prepare([replace(GOOD, stiffness=typed)], [])
     for taken in (0.0, 2e3, 50e3):
         check(replace(GOOD, stiffness=taken))
+
+
+def amplified(factor: float, stiffness: float) -> Record:
+    """A sweep that is followed with a lag of 20 ms, measured in another unit than it says."""
+    t = np.clip(T - 0.02, 0.0, None)
+    y = factor * 1.9e-3 * np.sin(np.pi / 8 * t**2)
+    return Record(2e-3 * np.sin(np.pi / 8 * T**2), y, 1 / 256, stiffness=stiffness, source='it')
+
+
+@pytest.mark.parametrize(
+    ('factor', 'stiffness', 'says'),
+    [
+        (1.0 / 25.4, 0.0, 'as of inches and millimetres in one unit'),
+        (25.4, 250e3, 'as of inches and millimetres in one unit'),
+        (1.0 / 25.4, 250e3, r'has 0\.037\d times the amplitude of the command'),
+        (0.1, 0.0, 'as of centimetres and millimetres in one unit'),
+        (10.0, 250e3, 'as of centimetres and millimetres in one unit'),
+    ],
+)
+def test_two_units_in_one_record_are_refused(factor: float, stiffness: float, says: str) -> None:
+    """Slow motion is followed nearly all the way, whatever the actuator."""
+    check(amplified(1.0, stiffness))
+    with pytest.raises(InputError, match=f'{says}.*check the units of both channels'):
+        check(amplified(factor, stiffness))
+
+
+def test_a_slow_amplitude_far_from_one_is_told() -> None:
+    """Half of it, or twice; under a specimen a tenth, which leakage might be. Lag excuses it."""
+    for factor, stiffness in ((0.5, 0.0), (2.0, 0.0), (0.5, 250e3), (0.1, 250e3)):
+        check(amplified(factor, stiffness))
+        (told,) = suspicions([amplified(factor, stiffness)])
+        assert told.startswith('it: the measured displacement has ') and 'units' in told
+    slow = scipy.signal.lfilter([0.002], [1.0, -0.998], U)  # a bandwidth of 0.08 Hz
+    assert not suspicions([amplified(1.0, 0.0), replace(GOOD, measured=slow)])
+    check(replace(GOOD, measured=slow))
