@@ -129,3 +129,15 @@ def test_a_record_that_is_too_short_says_nothing() -> None:
     (record,) = made(Command('sweep', 50.0, 3.0), (250e3,))
     theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
     assert residual_structure([record], 'rest', 0.0, Structure(()), theta) is None
+
+
+def test_what_is_told_of_means_says_so(rng_seed: int) -> None:
+    """Noise of 5 um at 2 kHz is less in the means that are fitted: their time is beside it."""
+    records = made(Command('sweep', 2000.0, 6.0), seed=rng_seed, noise=5e-6)
+    found = asked(records)
+    assert found.means_s > 2.0 / 2000.0
+    single = found.noise_m * np.sqrt(found.means_s * 2000.0)
+    assert 0.75 < single / 5e-6 < 1.1  # the filter is a little wider than a mean
+    assert found.amounts().endswith(f' of noise in means over {1e3 * found.means_s:.3g} ms')
+    slow = asked(made(Command('sweep', 100.0, 20.0), seed=rng_seed))
+    assert slow.means_s == 0.0 and slow.amounts().endswith(' um of noise')

@@ -56,6 +56,8 @@ class ResidualStructure(JsonObject):
         nats: by how much the other way explains more, out of sample.
         nats_needed: evidence beyond chance.
         setup: a set-up under which Eq. (2) explains the records far better; None for none.
+        means_s: time over which samples were averaged before this look, the longest of all records
+            [s]; 0 where all were taken as they are. Noise of single samples is larger.
     """
 
     structure_m: float
@@ -69,6 +71,7 @@ class ResidualStructure(JsonObject):
     nats: float
     nats_needed: float
     setup: WrongSetup | None = None
+    means_s: float = 0.0
 
     @property
     def matters(self) -> bool:
@@ -91,7 +94,8 @@ class ResidualStructure(JsonObject):
 
     def amounts(self) -> str:
         """Return structure and noise for people."""
-        return f'{_um(self.structure_m)} of structure over {_um(self.noise_m)} of noise'
+        told = f'{_um(self.structure_m)} of structure over {_um(self.noise_m)} of noise'
+        return told + (f' in means over {1e3 * self.means_s:.3g} ms' if self.means_s else '')
 
     def problem(self) -> str | None:
         """Return why the intervals do not hold, and what to do; None where they do."""
@@ -170,6 +174,10 @@ def residual_structure(
         nats=evidence(scorer.block_scores(other), scorer.block_scores(found)),
         nats_needed=settings.nats,
         setup=setup,
+        means_s=max(
+            (r.period for r, n in zip(data.records, data.factors, strict=True) if n > 1),
+            default=0.0,
+        ),
     )
 
 
