@@ -18,13 +18,18 @@ _LEAST, _MOST = 0.6, 1.6
 def suspicions(records: Sequence[Record]) -> tuple[str, ...]:
     """Return a sentence on each record whose set-up is doubtful, and what to check.
 
+    Where a free record follows slow motion all the way, the units are right: what less another
+    follows against its specimen is leakage.
+
     Args:
         records: as they were measured, with the stiffness that was given.
     """
-    out = []
-    for i, record in enumerate(records):
-        gain = slow_gain(record)
-        if gain is not None and not _LEAST < gain < _MOST:
+    out, gains = [], [slow_gain(r) for r in records]
+    free = (g for r, g in zip(records, gains, strict=True) if g is not None and not r.stiffness)
+    least = 0.0 if any(_LEAST < g < _MOST for g in free) else _LEAST
+    for i, (record, gain) in enumerate(zip(records, gains, strict=True)):
+        low = least if record.stiffness else _LEAST
+        if gain is not None and not low < gain < _MOST:
             out.append(
                 f'{where(record, i + 1)}: {told(gain)}; check the units and the calibration of '
                 'both channels'

@@ -197,6 +197,9 @@ def test_a_slow_amplitude_far_from_one_is_told() -> None:
         check(amplified(factor, stiffness))
         (told,) = suspicions([amplified(factor, stiffness)])
         assert told.startswith('it: the measured displacement has ') and 'units' in told
+    # A free record that follows all the way shows that the units are right: the rest is leakage.
+    assert not suspicions([GOOD, amplified(0.4, 250e3)])
+    assert suspicions([GOOD, amplified(0.4, 0.0)]) and suspicions([amplified(0.4, 250e3)])
     slow = scipy.signal.lfilter([0.002], [1.0, -0.998], U)  # a bandwidth of 0.08 Hz
     assert not suspicions([amplified(1.0, 0.0), replace(GOOD, measured=slow)])
     check(replace(GOOD, measured=slow))
