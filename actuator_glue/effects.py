@@ -18,6 +18,7 @@ from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.plain_yaml import plain_yaml
 
 register = CATALOGUE.register
 unregister = CATALOGUE.unregister
@@ -84,8 +85,10 @@ def save_effects(path: Path | str, effects: Iterable[Effect]) -> None:
 
 def _yaml(text: str, path: Path) -> Any:
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
+        return plain_yaml(text, str(path))
+    except InputError:
+        raise
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         mark = getattr(error, 'problem_mark', None)
         where = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
         raise InputError(f'{path}{where}: no YAML ({getattr(error, "problem", error)})') from None
@@ -105,12 +108,28 @@ def _literal(text: str, path: Path) -> Any:
         try:
             match node:
                 case ast.Assign(targets=[ast.Name(id='EFFECTS')]):
+                    _check_keys(node.value, path)
                     found = ast.literal_eval(node.value)
                 case _:
                     raise ValueError
+        except InputError:
+            raise
         except (ValueError, TypeError, RecursionError):
             raise InputError(
                 f'{path}, line {node.lineno}: the file is read, not executed; it may hold '
                 'EFFECTS = {...} of literals only'
             ) from None
     return found
+
+
+def _check_keys(literal: ast.expr, path: Path) -> None:
+    for node in ast.walk(literal):
+        lines: dict[Any, int] = {}
+        for key in node.keys if isinstance(node, ast.Dict) else ():
+            if isinstance(key, ast.Constant):
+                if key.value in lines:
+                    raise InputError(
+                        f'{path}: {key.value!r} stands twice, in line {lines[key.value]} and in '
+                        f'line {key.lineno}; keep one'
+                    )
+                lines[key.value] = key.lineno

@@ -67,8 +67,9 @@ ARROWS = {
     'json_value': set(),
     'optional_library': {'errors'},
     'arguments': {'errors'},
+    'plain_yaml': {'errors'},
     'model': BOTTOM,
-    'effects': BOTTOM | {'model'},
+    'effects': BOTTOM | {'model', 'plain_yaml'},
     'inference': BOTTOM | {'model'},
     'online': CORE,
     'hygiene': CORE,
@@ -77,6 +78,7 @@ ARROWS = {
     'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {
         'optional_library',
+        'plain_yaml',
         'motion',
         'records',
         'setups',
@@ -135,6 +137,7 @@ PURE = (
     'even_times',
     'normal',
     'json_value',
+    'plain_yaml',
     'model',
     'inference',
     'hygiene',
@@ -289,6 +292,13 @@ def test_a_name_means_one_thing() -> None:
     files = Counter(path.name for path in everywhere)
     assert not [name for name, count in classes.items() if count > 1]
     assert not [name for name, count in files.items() if count > 2]
+
+
+def test_yaml_is_read_in_one_place() -> None:
+    """Where no key may stand twice."""
+    loads = re.compile(r'\byaml\.(?:safe_|full_|unsafe_)?load\b')
+    found = [identifier(p) for p in SOURCES if loads.search(p.read_text(encoding='utf-8'))]
+    assert found == ['plain_yaml.py']
 
 
 def test_layout_is_left_to_the_formatter() -> None:

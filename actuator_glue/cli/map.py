@@ -111,13 +111,12 @@ def _quoted(value: str | int) -> str:
 
 def _fault(path: str, text: str | None) -> str:
     """Return why the file cannot be read with a map, or without; empty where it can."""
-    import yaml
-
     from actuator_glue.io.channel_map import parse_channel_map
     from actuator_glue.io.load import load_records
+    from actuator_glue.io.yaml_file import parse
 
     try:
-        channels = text and parse_channel_map(yaml.safe_load(text), 'proposed map')
+        channels = text and parse_channel_map(parse(text, 'proposed map'), 'proposed map')
         load_records(path, channels=channels or None, gap=note, warn=note)
     except InputError as error:
         return f'with this map the file is refused: {error}'

@@ -11,12 +11,11 @@ import yaml
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.disk_room import reserve
+from actuator_glue.plain_yaml import plain_yaml
 
 NAME = 'metadata.yaml'
 _TEMPORARY = NAME + '.tmp'
 ROOM_BYTES = 64 * 1024  # of metadata of a hundred topics and files
-# libyaml, where PyYAML was built with it, is ten times as fast.
-_LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
@@ -61,8 +60,8 @@ def qos_profiles(text: str) -> list[dict[str, Any]]:
     What cannot be understood is left out: a bag is worth reading without it.
     """
     try:
-        loaded = yaml.load(text, _LOADER)
-    except yaml.YAMLError:
+        loaded = plain_yaml(text, 'QoS', quick=True)
+    except (yaml.YAMLError, ValueError):
         return []
     profiles = []
     for entry in loaded if isinstance(loaded, list) else []:
@@ -205,12 +204,14 @@ def read(bag: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        content = yaml.load(path.read_text('utf-8'), _LOADER)
+        content = plain_yaml(path.read_text('utf-8'), str(path), quick=True)
         information: dict[str, Any] = content['rosbag2_bagfile_information']
         information['relative_file_paths'] = [
             str(name) for name in information['relative_file_paths']
         ]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+    except InputError as error:
+        raise InputError(f'{error}, or `actuator-glue recover {bag}` writes it anew') from error
+    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError) as error:
         raise InputError(
             f'{path}: this is not the metadata of a rosbag2 bag ({type(error).__name__}); '
             f'`actuator-glue recover {bag}` writes it anew from the data'

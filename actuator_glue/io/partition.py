@@ -9,12 +9,11 @@ from reprlib import repr as brief
 from typing import Any
 
 import numpy as np
-import yaml
 
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.partition import Partition, Specimen, modal_damping, square
 from actuator_glue.io.signature import text_encoding
-from actuator_glue.io.yaml_file import located, shipped
+from actuator_glue.io.yaml_file import located, parse, shipped
 from actuator_glue.records import Array
 
 FOLDER = 'partitions'  # of the package, with those that it brings
@@ -40,7 +39,7 @@ def read_partition(given: Path | str) -> Partition:
     try:
         if path.stat().st_size > _LARGEST:
             raise InputError(f'{path}: is no partition but a file of {path.stat().st_size} bytes')
-        content = yaml.safe_load(path.read_text(text_encoding(path)))
+        content = parse(path.read_text(text_encoding(path)), f'{path}: partition')
     except OSError as error:
         raise InputError(
             f'{path}: partition cannot be read ({error.strerror}); give a YAML file, or one of '
@@ -48,10 +47,6 @@ def read_partition(given: Path | str) -> Partition:
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: partition is not text in UTF-8') from error
-    except yaml.YAMLError as error:
-        raise InputError(
-            f'{path}: partition is not YAML ({" ".join(str(error).split())})'
-        ) from error
     try:
         return parse_partition(content, path.stem)
     except InputError as error:

@@ -13,6 +13,7 @@ import yaml
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.signature import text_encoding
+from actuator_glue.plain_yaml import plain_yaml
 
 LARGEST = 100_000  # bytes; a map or layout is a page of text
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -72,10 +73,12 @@ def parse(text: str, where: str, hint: str = '') -> object:
         hint: said behind the error.
 
     Raises:
-        InputError: no YAML.
+        InputError: no YAML, or a key twice in one mapping.
     """
     try:
-        return yaml.safe_load(text)
+        return plain_yaml(text, where)
+    except InputError:
+        raise
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         # ValueError: a date such as 2001-99-99; RecursionError: a thousand brackets.
         detail = ' '.join(str(error).split())
