@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.even_times import uneven
 from actuator_glue.io.look import ColumnLook, FileLook
-from actuator_glue.io.units import OF_NO_LENGTH, ROLES
+from actuator_glue.io.units import OF_NO_LENGTH, ROLES, contradict, written_unit
 from actuator_glue.motion import MOTIONS
 from actuator_glue.records import FASTEST_RATE, SLOWEST_RATE, Array
 from actuator_glue.velocity_command import is_velocity
@@ -184,7 +184,9 @@ def _counts_days(column: ColumnLook) -> bool:
 def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
     """Return a guess with the unit that name or file give, or the likeliest of the role."""
     if column.unit in ROLES[role]:
-        return Guess(column, column.unit, reasons)
+        named = written_unit(column.label)
+        doubt = f'unit: the name says {named!r}, and the file gives {column.unit!r}'
+        return Guess(column, column.unit, reasons, (doubt,) * contradict(named, column.unit))
     likeliest = {'time': 's', 'command': 'mm', 'measured': 'mm', 'force': 'kN'}[role]
     if role == 'time' and column.steps is not None:
         pace = float(column.steps.mean()) * SLOWEST_RATE

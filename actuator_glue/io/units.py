@@ -47,6 +47,10 @@ _MOVING = ('command', 'measured')
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
 _KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values())
 _LOWER = {unit.lower() for unit in _KNOWN}
+# What each unit is of, and its size there; of others than these only the spelling tells.
+_SIZES = {unit: (unit, 1.0) for unit in _KNOWN} | MOTIONS
+_SIZES |= {u: (what, f) for what in ('time', 'measured', 'force') for u, f in ROLES[what].items()}
+_SIZES |= {unit: ('torque', f) for unit, f in TORQUES.items()}
 _PLACE = re.compile(r'[\d:,\s]*')  # in brackets: which column of a matrix
 
 
@@ -162,6 +166,15 @@ def written_unit(name: str) -> str:
     return (units or capitals or [str(text) for text in inside] or [''])[-1]
 
 
+def contradict(named: str, stated: str) -> bool:
+    """Return whether the unit in a column's name and what the file gives as its unit differ.
+
+    Units that are not known here, and spellings of one unit, contradict nothing.
+    """
+    both = [_SIZES.get(unit.strip(' []()')) for unit in (named, stated)]
+    return None not in both and both[0] != both[1]
+
+
 def units_line(entries: list[str]) -> list[str]:
     """Return the units that a line below the names holds; nothing where it is no such line.
 
@@ -188,12 +201,14 @@ def choose(
 
     Args:
         names: column names, unit included.
-        units: what the file gives as the unit of each column; holds where the name has none.
+        units: what the file gives as the unit of each column; holds where the name has none, and
+            must not contradict it.
         where: file, for messages.
         needed: roles that must be there.
 
     Raises:
-        InputError: a unit is missing or unknown, a role is there twice or a needed one not.
+        InputError: a unit is missing, unknown or said twice differently, a role is there twice
+            or a needed one not.
     """
     found: dict[str, tuple[int, float]] = {}
     written: dict[str, str] = {}
@@ -206,6 +221,11 @@ def choose(
             raise InputError(f'{where}: two columns are called {role}; keep one')
         written[role] = unit or stated
         place = f'{where}: column {name.strip()!r}'
+        if contradict(unit, stated):
+            raise InputError(
+                f'{place} has unit {unit!r} in its name, and the file gives {stated!r} as its '
+                'unit; mend the one that is wrong, or say the unit in a channel map'
+            )
         found[role] = (position, of_file(role, written[role], place))
     for role in needed:
         if role not in found:

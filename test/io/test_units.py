@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -96,3 +97,49 @@ def test_a_unit_of_something_else_is_named(
     shown = capsys.readouterr().out
     assert "CHECK unit: the file says 'V': give mm per V as `scale`" in shown
     assert 'states none' not in shown
+
+
+@pytest.mark.parametrize(
+    ('units', 'said'),
+    [
+        ('s,m,mm', "'command_mm' has unit 'mm' in its name, and the file gives 'm'"),
+        ('ms,mm,mm', "'time_s' .* 's' .* 'ms'"),
+        ('[s],[mm],[in]', "'measured_mm' .* 'in'"),
+        ('s,mm,V', "'measured_mm' .* 'V'"),
+        ('s,mm,mm/s', "'measured_mm' .* 'mm/s'"),
+    ],
+)
+def test_units_that_contradict_are_refused(tmp_path: Path, units: str, said: str) -> None:
+    """In the name and beside it: nobody knows which is wrong."""
+    path = table(tmp_path / 'a.csv', ['time_s', 'command_mm', 'measured_mm'])
+    names, rows = path.read_text().split('\n', 1)
+    path.write_text(f'{names}\n{units}\n{rows}')
+    with pytest.raises(InputError, match=f'{said}.*mend the one that is wrong'):
+        read(path)
+
+
+def test_units_in_a_file_contradict_its_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in a line of text: what an attribute says of a dataset; `map` asks."""
+    path = tmp_path / 'a.h5'
+    columns = {'time_s': TIME, 'command_mm': COMMAND, 'measured_mm': MEASURED}
+    with h5py.File(path, 'w') as file:
+        for name, values in columns.items():
+            file[name] = values
+        file['command_mm'].attrs['units'] = 'm'
+    with pytest.raises(InputError, match=r"'command_mm' has unit 'mm' in its name.*'m'"):
+        read(path)
+    main(['map', str(path)])
+    assert "CHECK unit: the name says 'mm', and the file gives 'm'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    'units', ['s,mm,mm', 'sec,mm,mm', 's,mm,', '[s],[mm],-', 's,mm,Millimeter']
+)
+def test_units_said_twice_alike_are_read(tmp_path: Path, units: str) -> None:
+    """Another spelling of a unit, none, or one that is not known contradicts nothing."""
+    path = table(tmp_path / 'a.csv', ['time_s', 'command_mm', 'measured_mm'])
+    names, rows = path.read_text().split('\n', 1)
+    path.write_text(f'{names}\n{units}\n{rows}')
+    np.testing.assert_allclose(read(path).measured, MEASURED * 1e-3, atol=1e-9)
