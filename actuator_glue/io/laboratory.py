@@ -14,6 +14,7 @@ from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
+from actuator_glue.io.file_notes import noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
@@ -196,7 +197,7 @@ def _by_name(
         values = {
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
-    notes, period, start_ns = table.notes, table.period, table.start_ns
+    notes, period, start_ns = noted(table.notes, str(path)), table.period, table.start_ns
     del raw, table  # a long file's columns as they were read are not held beside these
     return values, notes, None if 'time' in values else period, start_ns, motion
 

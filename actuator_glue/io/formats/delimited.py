@@ -15,6 +15,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.file_notes import add_note, note_of
 from actuator_glue.io.formats import Column, FileTable, Format
 from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import EXAMPLE, bare, units_line
@@ -66,7 +67,7 @@ class TextHead:
         units: of the columns, where a line below the names holds them.
         lines: lines before the first sample.
         delimiter: text between columns, None for blanks.
-        notes: `# name = value` lines.
+        notes: `# name = value` lines, and `# name: value` where the name is one of `NOTES`.
         decimal: decimal sign of the samples.
         width: entries of a row.
         least: entries that a row has at least; the last ones may be remarks, and left out.
@@ -158,8 +159,11 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
     while at < len(top) and _COMMENT.match(top[at]):
         comment = uncommented(top[at])
         name, sign, value = comment.partition('=')
+        before, colon, behind = comment.partition(':')
+        if colon and note_of(before) is not None:
+            name, sign, value = before, colon, behind
         if sign:
-            notes[name.strip()] = value.strip()
+            add_note(notes, name.strip(), value.strip(), str(path))
         else:
             comments.append(comment)
         at += 1

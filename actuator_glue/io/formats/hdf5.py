@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.file_notes import NOTES, nearly
 from actuator_glue.io.formats import (
     MOST_COLUMNS,
     Column,
@@ -33,7 +34,6 @@ _FIELDS = ('data', 'values', 'value')
 _NAMES = ('name', 'label')
 _NAME = 'an HDF5 file'
 _UNITS = ('unit', 'units', 'Unit', 'Units')
-_NOTES = ('stiffness_N_per_m', 'hold', 'actuator')
 
 
 def is_hdf5(path: Path) -> bool:
@@ -66,7 +66,7 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
             return [_values(file[name], part, path) for name, part in chosen]
 
     with reading(path, _NAME), h5py.File(path, 'r') as file:
-        tree.notes |= {n: _plain(file.attrs[n]) for n in _NOTES if n in file.attrs}
+        tree.notes |= {n: _plain(v) for n, v in file.attrs.items() if nearly(n)}
         file.visititems(tree.visit)
     if not tree.columns and not matlab:
         raise InputError(f'{path}: no numeric vector or matrix in this file')
@@ -139,7 +139,7 @@ class _Tree:
 
     def _note(self, dataset: Any, shown: str) -> None:
         label = shown.replace('/', '.').rpartition('.')[2]
-        if label in _NOTES:
+        if label in NOTES:
             self.notes[label] = _text(dataset)
         if _is_text(dataset):
             self.texts[shown] = _text(dataset)

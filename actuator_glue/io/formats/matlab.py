@@ -13,6 +13,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.file_notes import NOTES
 from actuator_glue.io.formats import (
     Column,
     FileTable,
@@ -77,7 +78,8 @@ def _plain(content: dict[str, Any]) -> FileTable:
         found = matrix_columns(name, array.shape)
         columns += found
         places += [(name, i) for i in range(len(found))]
-    notes = {name.rpartition('.')[2]: text for name, text in texts.items()}
+    named = ((name.rpartition('.')[2], text) for name, text in texts.items())
+    notes = {name: text for name, text in named if name in NOTES}
     for name, array in arrays.items():
         if name.rpartition('.')[2] == 'stiffness_N_per_m' and array.size == 1:
             notes['stiffness_N_per_m'] = repr(float(array.flat[0]))

@@ -1,0 +1,82 @@
+"""What a file says of a test beside its columns: comments of a text, attributes, properties."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+
+from actuator_glue.errors import InputError
+
+# What is understood, and what each is written as.
+NOTES = {
+    'stiffness_N_per_m': 'the specimen stiffness in N/m',
+    'hold': 'zoh or linear',
+    'actuator': 'its name',
+}
+_PLAIN = {name.casefold(): name for name in NOTES}
+# Names that can only be meant for one of these.
+_MEANT = {
+    'stiffness_N_per_m': re.compile(
+        r'(?:specimen_)?stiffness(?:_?[\[(]?[km]?n(?:_?per_?|_?/_?)[cmµu]?m\W*)?'
+    ),
+    'hold': re.compile(r'(?:command_)?hold(?:_type|_mode|_order|_of_(?:the_)?command)?'),
+}
+_TYPED = 0.85  # as alike as words are where a letter of a long one is missing or exchanged
+
+
+def note_of(name: str) -> str | None:
+    """Return the name of `NOTES` that is written here, in capitals or small; None for no such."""
+    return _PLAIN.get(_plain(name))
+
+
+def nearly(name: str) -> bool:
+    """Return whether a name is one of `NOTES`, or can only be meant for one."""
+    return note_of(name) is not None or _meant(name) is not None
+
+
+def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
+    """Return what a file says besides, by the names of `NOTES`; other notes are left out.
+
+    Args:
+        notes: all that the file says, by the names that it uses.
+        where: file, for messages.
+
+    Raises:
+        InputError: a name that is nearly one of `NOTES`, or one said twice, differently.
+    """
+    found: dict[str, str] = {}
+    for name, value in notes.items():
+        known, meant = note_of(name), _meant(name)
+        if known is None and meant is not None:
+            raise InputError(
+                f'{where}: the note {f"{name} = {value}"!r} is not understood; write '
+                f'`{meant} = VALUE`, which is {NOTES[meant]}, or take it out'
+            )
+        if known is not None:
+            add_note(found, known, value, where)
+    return found
+
+
+def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
+    """Add what a file says under a name; of names that are not understood the last counts.
+
+    Raises:
+        InputError: one of `NOTES` is said twice, differently.
+    """
+    if note_of(name) is not None and notes.get(name, value) != value:
+        raise InputError(f'{where}: {name} is said twice, {notes[name]!r} and {value!r}; keep one')
+    notes[name] = value
+
+
+def _plain(name: str) -> str:
+    return re.sub(r'[\s-]+', '_', name.strip()).casefold()
+
+
+def _meant(name: str) -> str | None:
+    plain = _plain(name)
+    for known, pattern in _MEANT.items():
+        if pattern.fullmatch(plain) is not None:
+            return known
+    near = difflib.get_close_matches(plain, ['stiffness_n_per_m'], 1, _TYPED)
+    return 'stiffness_N_per_m' if near else None

@@ -1,0 +1,70 @@
+"""Stiffness, hold and name that a file states: nearly right is not passed over."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.laboratory import read
+
+TIME = np.arange(1000) * 1e-3
+COLUMNS = {'time_s': TIME, 'command_mm': np.sin(30 * TIME), 'measured_mm': np.sin(30 * TIME - 0.1)}
+
+
+def text(path: Path, *comments: str) -> Path:
+    """Write a text with comments above the names."""
+    head = '\n'.join([*comments, ','.join(COLUMNS)])
+    rows = np.column_stack(list(COLUMNS.values()))
+    np.savetxt(path, rows, fmt='%.6f', delimiter=',', header=head, comments='')
+    return path
+
+
+@pytest.mark.parametrize('sign', ['=', ' = ', ':', ': '])
+def test_capitals_and_colons_are_read(tmp_path: Path, sign: str) -> None:
+    """What can be meant in one way only is taken; other comments are left alone."""
+    said = [f'# Hold{sign}linear', f'# STIFFNESS_N_per_m{sign}250e3', f'% Actuator{sign}mts 3']
+    prose = ['# Test 7: hold on', '# Stiffness: see drawing', '# hold_time = 5', '# a = b = c']
+    record = read(text(tmp_path / 'a.csv', *said, *prose))
+    assert (record.hold, record.stiffness, record.actuator) == ('linear', 250e3, 'mts 3')
+
+
+@pytest.mark.parametrize(
+    ('note', 'said'),
+    [
+        ('stiffness = 250e3', '`stiffness_N_per_m = VALUE`, which is the specimen stiffness'),
+        ('Stiffness [N/m] = 250e3', 'stiffness_N_per_m'),
+        ('specimen stiffness = 250e3', 'stiffness_N_per_m'),
+        ('stiffness_kN_per_mm = 0.25', 'stiffness_N_per_m'),
+        ('stifness_N_per_m = 250e3', 'stiffness_N_per_m'),
+        ('hold_type = linear', '`hold = VALUE`, which is zoh or linear'),
+    ],
+)
+def test_notes_nearly_right_are_refused(tmp_path: Path, note: str, said: str) -> None:
+    """Passed over, the hold would be zoh: half a sample of delay that is none."""
+    with pytest.raises(InputError, match=r'a\.csv: the note .* is not understood; write') as found:
+        read(text(tmp_path / 'a.csv', f'# {note}'))
+    assert said in str(found.value)
+
+
+def test_notes_said_twice_are_refused(tmp_path: Path) -> None:
+    """The last would win; twice the same is said once."""
+    for second in ('# hold = zoh', '# Hold: zoh'):
+        with pytest.raises(InputError, match=r"old is said twice, 'linear' and 'zoh'; keep one"):
+            read(text(tmp_path / 'a.csv', '# hold = linear', second))
+    assert read(text(tmp_path / 'a.csv', *['# hold = linear'] * 2)).hold == 'linear'
+
+
+def test_attributes_are_notes_too(tmp_path: Path) -> None:
+    """Read whatever their capitals; nearly right ones are refused as in a text."""
+    path = tmp_path / 'a.h5'
+    with h5py.File(path, 'w') as file:
+        for name, values in COLUMNS.items():
+            file[name] = values
+        file.attrs['Hold'] = 'linear'
+    assert read(path).hold == 'linear'
+    with h5py.File(path, 'a') as file:
+        file.attrs['stiffness'] = 250e3
+    with pytest.raises(InputError, match=r"'stiffness = 250000.0' is not understood"):
+        read(path)
