@@ -180,8 +180,12 @@ def simulate(
 
 
 def samples_of(command: Command | Record) -> Array:
-    """Return the samples of a shape, or the command of a record, shape (n,) [m]."""
-    return command.command if isinstance(command, Record) else command.samples()
+    """Return the samples of a shape, or the command of a record, shape (n,) [m].
+
+    Raises:
+        InputError: a shape that cannot be made, or a record that moves in another unit.
+    """
+    return commands.in_metres(command) if isinstance(command, Record) else command.samples()
 
 
 def _benchmark(rate: float, hold: Hold, seed: int, sensors: Sensors) -> Plant:

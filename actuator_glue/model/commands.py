@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.errors import InputError
+from actuator_glue.motion import METRES
 from actuator_glue.records import MAX_DISPLACEMENT, Array, Record
 
 MAX_SAMPLES = 100_000_000  # 800 MB: beyond this a rate or duration is a slip of the unit
@@ -187,6 +188,21 @@ def _kanai_tajimi(
     return np.asarray(scipy.signal.sosfilt(scipy.signal.tf2sos(*z), drive))
 
 
+def in_metres(record: Record) -> Array:
+    """Return a record's command, shape (n,) [m].
+
+    Raises:
+        InputError: it is no displacement: degrees, counts, volts.
+    """
+    if record.motion != METRES:
+        where = f'{record.source}: ' if record.source else ''
+        raise InputError(
+            f'{where}the command is in {record.motion}, and the simulated actuator moves '
+            f'in metres; give mm per {record.motion} as `scale`, with `unit: mm`, in a channel map'
+        )
+    return record.command
+
+
 def recorded(record: Record, rate: float | None = None, amplitude: float | None = None) -> Array:
     """Return a record's command at another rate or amplitude, shape (n,) [m].
 
@@ -198,9 +214,9 @@ def recorded(record: Record, rate: float | None = None, amplitude: float | None 
         amplitude: peak displacement [m]; the record's own if None.
 
     Raises:
-        InputError: as `sweep`.
+        InputError: as `sweep`, or a record that moves in another unit than metres.
     """
-    u = record.command
+    u = in_metres(record)
     if rate is not None and rate != record.rate:
         t = _times(rate, (len(u) - 1) * record.period, 0.0)
         if record.hold == 'linear':

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
+from actuator_glue.api.simulation import simulate
 from actuator_glue.errors import InputError
 from actuator_glue.model import commands, reference_problem
 from actuator_glue.model.parameters import TABLE_2
@@ -73,6 +74,16 @@ def test_recorded_keeps_the_meaning_of_the_hold():
         commands.recorded(linear, 20.0), np.array([0, 0.5, 1, 0, -1, 0.5, 2]) * 1e-3, atol=1e-15
     )
     assert np.abs(commands.recorded(zoh, amplitude=5e-3)).max() == pytest.approx(5e-3)
+
+
+def test_a_recorded_command_of_counts_is_no_displacement():
+    """A count stands in a record as a micrometre, and is none."""
+    u = np.array([0.0, 1e-3, -1e-3, 2e-3])
+    counts = Record(u, u, 0.1, source='adc.csv', motion='counts')
+    message = r'adc\.csv: the command is in counts, .* metres; give mm per counts as `scale`'
+    for use in (commands.recorded, simulate):
+        with pytest.raises(InputError, match=message):
+            use(counts)
 
 
 @pytest.mark.parametrize(
