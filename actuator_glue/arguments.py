@@ -52,6 +52,32 @@ def stiffness(text: str) -> float | Literal['unknown']:
     return 'unknown' if text == 'unknown' else number(text)
 
 
+def only_with(args: argparse.Namespace, options: str, *needed: str) -> None:
+    """Refuse options that do nothing without another one.
+
+    Args:
+        args: as parsed; what was not given is None there.
+        options: some that need one of these, as '--drift --prior-age'.
+        needed: the others, any of which is enough.
+
+    Raises:
+        InputError: one was given, and none of the others.
+    """
+    if any(_given(args, name) for name in needed):
+        return
+    for option in options.split():
+        if _given(args, option):
+            raise InputError(
+                f'{option} does nothing without {" or ".join(needed)}; add that, or take {option} '
+                'out'
+            )
+
+
+def _given(args: argparse.Namespace, option: str) -> bool:
+    value = getattr(args, option.lstrip('-').replace('-', '_'))
+    return value is not None and value is not False and value != []
+
+
 class Output(str):
     """A file or bag that a command writes; `-` is standard output."""
 

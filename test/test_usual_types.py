@@ -176,6 +176,7 @@ def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: 
         evaluations=kind(60000),
         seed=kind(3),
         settle=kind(2),
+        prior='monday.npz',
         drift=kind(1),
         prior_age=kind(60),
         bounds={'beta_1': (kind(0), kind(800))},
@@ -185,14 +186,16 @@ def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: 
         evaluations=60000,
         seed=3,
         settle=2,
+        prior='monday.npz',
         drift=1,
         prior_age=60,
         bounds={'beta_1': (0, 800)},
         shaping_factor=256,
     )
     assert options == plain and type(options.evaluations) is int
-    diagnosis = DiagnosisOptions(seed=kind(3), jobs=kind(2), drift=kind(1), prior_age=kind(60))
-    assert diagnosis == DiagnosisOptions(3, 2, drift=1, prior_age=60)
+    known = {'prior': 'monday.npz', 'drift': kind(1), 'prior_age': kind(60)}
+    diagnosis = DiagnosisOptions(seed=kind(3), jobs=kind(2), **known)
+    assert diagnosis == DiagnosisOptions(3, 2, prior='monday.npz', drift=1, prior_age=60)
     specimen = api.Specimen(kind(2), kind(3), k, {'mass': kind(1)})
     assert specimen == api.Specimen(2.0, 3.0, 250e3, {'mass': 1.0})
     assert type(specimen.stiffness) is float

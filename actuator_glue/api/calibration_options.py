@@ -10,7 +10,7 @@ from typing import Any, Literal, TypedDict
 
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import seed_given
-from actuator_glue.api.prior import check_prior
+from actuator_glue.api.prior import DRIFT, check_prior
 from actuator_glue.errors import InputError
 from actuator_glue.given import number, take_numbers
 
@@ -51,7 +51,7 @@ class CalibrationOptions:
     initial: Literal['auto', 'rest', 'measured'] = 'auto'
     settle: float | None = None
     prior: Calibration | Path | str | None = None
-    drift: float = 0.02
+    drift: float = DRIFT
     prior_age: timedelta | float = 0.0
     use_force: bool = False
 
@@ -72,9 +72,14 @@ class CalibrationOptions:
             )
         if isinstance(self.shaping_factor, str) and self.shaping_factor != 'auto':
             raise InputError(f"shaping factor {self.shaping_factor!r} is no number, nor 'auto'")
+        if self.shaping_factor != 'auto' and self.likelihood != 'glue':
+            raise InputError(
+                f"a shaping factor is one of the likelihood 'glue', Eq. (4), and "
+                f'{self.likelihood!r} has none; leave one of both out'
+            )
         if self.settle is not None and self.settle < 0.0:
             raise InputError(f'settle {self.settle:g} s is negative')
-        check_prior(self.drift, self.prior_age)
+        check_prior(self.prior is not None, self.drift, self.prior_age)
         for name, known in (
             ('likelihood', ('glue', 'gaussian', 'ar1')),
             ('initial', ('auto', 'rest', 'measured')),

@@ -23,7 +23,7 @@ from actuator_glue.api.frame import frame
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.posterior_model import PosteriorModel
-from actuator_glue.api.prior import check_prior, given_prior
+from actuator_glue.api.prior import DRIFT, check_prior, given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
@@ -290,7 +290,7 @@ class DiagnosisOptions:
     jobs: int = 2
     false_alarms: float = 0.01
     prior: Calibration | GivenPrior | Path | str | None = None
-    drift: float = 0.02
+    drift: float = DRIFT
     prior_age: timedelta | float = 0.0
     use_force: bool = False
     effort: float = 1.0
@@ -298,7 +298,7 @@ class DiagnosisOptions:
     def __post_init__(self) -> None:
         object.__setattr__(self, 'seed', seed_given(self.seed))
         take_numbers(self)
-        check_prior(self.drift, self.prior_age)
+        check_prior(self.prior is not None, self.drift, self.prior_age)
         if self.jobs < 1:
             raise InputError(f'jobs {self.jobs} is below 1')
         if not self.effort > 0.0:

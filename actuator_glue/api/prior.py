@@ -16,17 +16,24 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Drift
 from actuator_glue.inference.prior_use import GivenPrior
 
+DRIFT = 0.02  # h^-1/2, where nothing else is said
 
-def check_prior(drift: float, age: timedelta | float) -> float:
+
+def check_prior(given: bool, drift: float, age: timedelta | float) -> float:
     """Return an age in seconds; refuse a drift [h^-1/2] or an age that cannot be used.
 
     Raises:
-        InputError: either cannot be used.
+        InputError: either cannot be used, or is said where no prior is given.
     """
     since = seconds(age, 'prior_age')
     if not 0.0 <= since < np.inf:
         raise InputError(f'prior_age {since:g} s is no time since a calibration')
     Drift(drift)
+    if not given and (drift != DRIFT or since):
+        raise InputError(
+            'drift and prior_age say how an earlier calibration has aged, and none is given; give '
+            'it as prior, or leave both out'
+        )
     return since
 
 
@@ -45,7 +52,7 @@ def given_prior(
     Raises:
         InputError: a file that holds no calibration, or numbers as `check_prior`.
     """
-    since = check_prior(drift, age)
+    since = check_prior(earlier is not None, drift, age)
     if earlier is None or isinstance(earlier, GivenPrior):
         return earlier
     if isinstance(earlier, (str, Path)) and store.schema_of(earlier) == PooledPrior.schema:

@@ -188,6 +188,11 @@ def replay(
 def _open(source: Records, namespace: str | None, compare_live: bool) -> _Run:
     if isinstance(source, (str, PathLike)) and is_bag(fspath(source)):
         return _open_bag(fspath(source), namespace, compare_live)
+    if namespace is not None:
+        raise InputError(
+            f'namespace {namespace!r} says whose samples of a bag are meant, and what is replayed '
+            'here are records (a file, or a bag with another stiffness or hold); take it out'
+        )
     records = records_given(source, name='source')
     for record in records:
         record.known_stiffness()

@@ -189,6 +189,12 @@ def samples_of(command: Command | Record) -> Array:
 
 
 def _benchmark(rate: float, hold: Hold, seed: int, sensors: Sensors) -> Plant:
+    usual = Sensors()
+    if (sensors.force_noise, sensors.bits) != (usual.force_noise, usual.bits):
+        raise InputError(
+            'the benchmark plant has its own force sensor and converters: of the sensors it takes '
+            'the noise of the displacement alone'
+        )
     spec = benchmark_plant.DISPLACEMENT_SENSOR
     if sensors.noise is not None:
         spec = replace(spec, noise=sensors.noise)

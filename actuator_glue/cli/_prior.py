@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.arguments import duration, number
+from actuator_glue.arguments import duration, number, only_with
 
 
 def add_prior(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +20,6 @@ def add_prior(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--drift',
         type=number,
-        default=0.02,
         metavar='RATE',
         help='how far the logarithm of each parameter may wander in an hour since, standard '
         'deviation (default 0.02)',
@@ -28,12 +27,17 @@ def add_prior(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--prior-age',
         type=duration,
-        default=0.0,
         metavar='TIME',
         help='time since that calibration with its unit, as 90s, 30min, 24h or 2d (default 0)',
     )
 
 
 def prior_options(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments as options of `calibrate` and `diagnose`."""
-    return {'prior': args.prior, 'drift': args.drift, 'prior_age': args.prior_age}
+    """Return the arguments that were given as options of `calibrate` and `diagnose`.
+
+    Raises:
+        InputError: age or drift of no prior.
+    """
+    only_with(args, '--drift --prior-age', '--prior')
+    given = {'prior': args.prior, 'drift': args.drift, 'prior_age': args.prior_age}
+    return {name: value for name, value in given.items() if value is not None}

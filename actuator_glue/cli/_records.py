@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import number, stiffness
+from actuator_glue.arguments import number, only_with, stiffness
 from actuator_glue.cli._output import note
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
@@ -54,7 +54,6 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--resample-by',
         choices=('band-limited', 'lines'),
-        default='band-limited',
         help='how: band-limited keeps more of what is fast, straight lines make no overshoot at '
         'steps (default band-limited)',
     )
@@ -67,8 +66,13 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def resampling(args: argparse.Namespace) -> Resample | None:
-    """Return what --resample and --resample-by say."""
-    return None if args.resample is None else (args.resample, args.resample_by)
+    """Return what --resample and --resample-by say.
+
+    Raises:
+        InputError: a way, and no rate.
+    """
+    only_with(args, '--resample-by', '--resample')
+    return None if args.resample is None else (args.resample, args.resample_by or 'band-limited')
 
 
 def load(args: argparse.Namespace) -> list[Record]:

@@ -14,6 +14,8 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.formats import writable
 from actuator_glue.records import Record
 
+_BLOCK = 64  # samples per message, where nothing else is asked for
+
 
 def add_out(parser: argparse.ArgumentParser) -> None:
     """Add OUT, --block and --unit."""
@@ -25,12 +27,11 @@ def add_out(parser: argparse.ArgumentParser) -> None:
     )
     add_force(parser)
     parser.add_argument(
-        '--block', type=int, default=64, metavar='N', help='samples per message (default 64)'
+        '--block', type=int, metavar='N', help='samples per message of a bag (default 64)'
     )
     parser.add_argument(
         '--unit',
         choices=('mm', 'm'),
-        default='mm',
         help='unit of displacements in files; m loses not one bit (default mm)',
     )
 
@@ -52,7 +53,14 @@ def check_out(args: argparse.Namespace) -> Path:
             f'{out}: {out.suffix} cannot be written; use {", ".join(writable())}, or a name '
             'without a suffix for a bag'
         )
-    if args.block < 1:
+    for option, value, written in (
+        ('--block', args.block, out.suffix not in writable()),
+        ('--unit', args.unit, out.suffix in writable()),
+    ):
+        if value is not None and not written:
+            what = 'a bag, which is in metres' if option == '--unit' else 'a file without messages'
+            raise InputError(f'{option} does nothing for {out}, {what}; take it out')
+    if args.block is not None and args.block < 1:
         raise InputError(f'--block {args.block}: a message holds at least one sample')
     if out.exists() and out.is_dir() == (out.suffix in writable()):
         raise InputError(
@@ -75,7 +83,7 @@ def save(records: list[Record], args: argparse.Namespace) -> None:
         written = _files(records, out, args)
     else:
         with _replacing(out):
-            _bag(records, out, args.block)
+            _bag(records, out, args.block or _BLOCK)
     samples = sum(len(r) for r in records)
     say(f'{", ".join(map(str, written))}: {len(records)} record(s), {samples} samples', args)
 
@@ -91,7 +99,7 @@ def _files(records: list[Record], out: Path, args: argparse.Namespace) -> list[P
     with progress('writing', sum(len(r) for r in records)) as done:
         before = 0
         for path, record in zip(paths, records, strict=True):
-            write(path, record, unit=args.unit)
+            write(path, record, unit=args.unit or 'mm')
             before += len(record)
             done(before)
     return paths

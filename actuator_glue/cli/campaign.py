@@ -66,7 +66,8 @@ def run(args: argparse.Namespace) -> int:
         InputError: as `campaign`, or options that do not belong together.
     """
     if args.watch is not None:
-        if args.records or args.out or args.recipe:
+        others = (args.records, args.out, args.recipe, args.workers, args.scheduler, args.again)
+        if any(others):
             raise InputError('--watch looks at a campaign that runs; give it alone')
         return _watch(Path(args.watch))
     if not args.records or args.out is None:

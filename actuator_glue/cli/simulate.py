@@ -27,6 +27,16 @@ EXAMPLES = (
 )
 
 
+# Options of a command, and those that each shape uses; a file has its length and frequencies.
+_OF_COMMANDS = '--rate --duration --amplitude-mm --f0 --f1 --frequency --command-seed --channels'
+_USED = {
+    'sweep': '--rate --duration --amplitude-mm --f0 --f1',
+    'sine': '--rate --duration --amplitude-mm --frequency',
+    'noise': '--rate --duration --amplitude-mm --f0 --f1 --command-seed',
+    'earthquake': '--rate --duration --amplitude-mm --command-seed',
+}
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_out(parser)
@@ -80,8 +90,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     command.add_argument('--amplitude-mm', type=number, help='peak displacement (default 2)')
     command.add_argument('--f0', type=number, metavar='HZ', help='lowest frequency (default 0)')
     command.add_argument('--f1', type=number, metavar='HZ', help='highest frequency (default 10)')
-    command.add_argument('--frequency', type=number, default=1.0, metavar='HZ', help='of a sine')
-    command.add_argument('--command-seed', type=int, default=0, help='of noise and earthquake')
+    command.add_argument('--frequency', type=number, metavar='HZ', help='of a sine (default 1)')
+    command.add_argument(
+        '--command-seed', type=int, metavar='S', help='of noise and earthquake (default 0)'
+    )
     command.add_argument('--channels', metavar='MAP.yaml', help='channel map of FILE')
     parser.add_argument('--hold', choices=('zoh', 'linear'), default='zoh', help='default zoh')
 
@@ -92,8 +104,9 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: an option cannot be used, or the output exists or cannot be written.
     """
-    if args.seed < 0 or args.command_seed < 0:
+    if args.seed < 0 or (args.command_seed or 0) < 0:
         raise InputError('seeds are whole numbers of at least 0')
+    _refuse_idle(args)
     load_effects(args)
     out = check_out(args)
     sealed = out.with_name(out.name + '.truth.json')
@@ -119,6 +132,28 @@ def run(args: argparse.Namespace) -> int:
         for line in _unseen(args, command, stiffnesses):
             note(line)
     return 0
+
+
+def _refuse_idle(args: argparse.Namespace) -> None:
+    """Refuse options that the plant or the command does not use.
+
+    Raises:
+        InputError: one of them was given.
+    """
+    used = _USED.get(args.shape, '--channels --amplitude-mm --rate').split()
+    by = f'--command {args.shape}'
+    if args.plant == 'problem-r':
+        used, by = (
+            ['--duration', '--rate'],
+            '--plant problem-r, whose command is that of the paper',
+        )
+        if args.shape != 'sweep':
+            raise InputError(f'--command {args.shape} does nothing with {by}; take it out')
+    for option in _OF_COMMANDS.split():
+        if getattr(args, option[2:].replace('-', '_')) is not None and option not in used:
+            raise InputError(f'{option} does nothing with {by}; take it out')
+    if args.plant == 'problem-r' and (args.force_noise_n, args.bits) != (None, None):
+        raise InputError('--force-noise-n and --bits do nothing with --plant problem-r')
 
 
 def _test(
@@ -222,12 +257,13 @@ def _command(args: argparse.Namespace) -> Command | Record:
 
     amplitude = None if args.amplitude_mm is None else args.amplitude_mm * 1e-3
     if args.shape in COMMANDS:
+        frequency = 1.0 if args.frequency is None else args.frequency
         given = {
             'rate': args.rate,
             'duration': args.duration,
             'amplitude': amplitude,
             'low': args.f0,
-            'high': args.frequency if args.shape == 'sine' else args.f1,
+            'high': frequency if args.shape == 'sine' else args.f1,
             'seed': args.command_seed,
         }
         return Command(args.shape, **{k: v for k, v in given.items() if v is not None})

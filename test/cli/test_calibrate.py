@@ -307,7 +307,7 @@ def test_the_other_hold_is_asked_too(run, tmp_path: Path) -> None:
 )
 def test_the_age_of_a_prior_has_a_unit(given: str, seconds: float) -> None:
     """The same seconds as the API's `prior_age`; a number alone could be hours."""
-    words = ['calibrate', 'r.csv', '--prior-age', given]
+    words = ['calibrate', 'r.csv', '--prior', 'monday.npz', '--prior-age', given]
     assert prior_options(build_parser('calibrate').parse_args(words))['prior_age'] == seconds
 
 
