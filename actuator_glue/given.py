@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, SupportsFloat, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
 
@@ -48,6 +49,58 @@ def whole(value: object, name: str) -> int:
     if not found.is_integer():
         raise InputError(f'{name} is {_shown(value)}; give a whole number')
     return int(found)
+
+
+def of_kind(value: object, name: str, kinds: type | tuple[type, ...], wanted: str) -> None:
+    """Refuse a value of a kind that cannot be used, before something is asked of it.
+
+    Args:
+        value: what was given.
+        name: of the argument, for the message.
+        kinds: a class, or several.
+        wanted: what can be given, for the message.
+
+    Raises:
+        InputError: it is of another kind.
+    """
+    if not isinstance(value, kinds):
+        raise InputError(f'{name} is {_shown(value)}; give {wanted}')
+
+
+def one_of(value: object, name: str, known: Sequence[str]) -> None:
+    """Refuse what is none of the words known.
+
+    Raises:
+        InputError: another word, or none.
+    """
+    if not isinstance(value, str) or value not in known:
+        raise InputError(f'{name} {_shown(value)} is unknown; use one of {", ".join(known)}')
+
+
+def vector(value: object, name: str) -> NDArray[np.float64]:
+    """Return numbers as an array, of whatever shape they were given in.
+
+    Raises:
+        InputError: something else.
+    """
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(
+            f'{name} is {_shown(value)}, which holds no numbers; give numbers'
+        ) from None
+
+
+def names(value: object, name: str) -> tuple[str, ...]:
+    """Return names that were given as one text or as several.
+
+    Raises:
+        InputError: something else.
+    """
+    found = (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    if not all(isinstance(one, str) for one in found):
+        raise InputError(f'{name} is {_shown(value)}; give one name, or several')
+    return found
 
 
 def take_numbers(options: DataclassInstance, but: Iterable[str] = ()) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
-from actuator_glue.given import number
+from actuator_glue.given import number, whole
 from actuator_glue.motion import METRES, MOTIONS, TORQUES, WRITTEN, spoken
 from actuator_glue.si import FORCE, LENGTH
 
@@ -352,8 +352,9 @@ class Record:
         """Return samples start:stop as a record of its own (same stream index and clock).
 
         Raises:
-            InputError: fewer than two samples remain.
+            InputError: fewer than two samples remain, or what is no number of a sample.
         """
+        start, stop = whole(start, 'start'), whole(stop, 'stop')
         start, stop, _ = slice(start, stop).indices(len(self))
         if (start, stop) == (0, len(self)):
             return self

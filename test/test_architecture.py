@@ -77,6 +77,7 @@ ARROWS = {
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {
+        'given',
         'optional_library',
         'plain_yaml',
         'motion',

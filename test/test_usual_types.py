@@ -226,6 +226,46 @@ def test_what_is_no_number_is_refused_by_name(wrong: Any, file: Path) -> None:
             call()
 
 
+ODD = [object(), {'a': 1}, 'no', 1.5, -1.0, [1.0, 2.0], np.zeros((2, 2)), b'x', True]
+
+
+@pytest.mark.parametrize('wrong', ODD, ids=lambda wrong: type(wrong).__name__)
+def test_arguments_of_another_kind_are_refused(wrong: Any, file: Path) -> None:
+    """Never with an error of Python's: the message begins with the argument."""
+    usual = api.Command(rate=200, duration=3)
+    record = api.simulate(usual)
+    calls: dict[str, Callable[[], object]] = {
+        'hold': lambda: api.load(file, hold=wrong),
+        'command': lambda: api.simulate(wrong),
+        'theta': lambda: api.simulate(usual, theta=wrong),
+        'sensors': lambda: api.simulate(usual, sensors=wrong),
+        'plant': lambda: api.simulate(usual, plant=wrong),
+        'likelihood': lambda: CalibrationOptions(likelihood=wrong),
+        'joining': lambda: api.join(file, file, by=wrong),
+        'options': lambda: api.calibrate(record, wrong),
+    }
+    if not isinstance(wrong, str):
+        calls |= {
+            'channels': lambda: api.load(file, channels=wrong),
+            'recipe': lambda: api.campaign(file, 'out', wrong),
+            'effect': lambda: api.simulate(usual, effects=wrong),
+        }
+    if not isinstance(wrong, dict):
+        calls |= {
+            'records|no such': lambda: api.campaign(wrong, 'out'),
+            'bounds': lambda: CalibrationOptions(bounds=wrong),
+            'stddev': lambda: api.Specimen(1.0, 1.0, 1.0, wrong),
+            'effects|catalogue': lambda: api.calibrate(record, effects=wrong),
+        }
+    if wrong is not ODD[3]:
+        calls['resampl'] = lambda: api.load(file, resample=wrong)
+    if wrong is not ODD[4]:
+        calls['start'] = lambda: record.slice(wrong, 500)
+    for name, call in calls.items():
+        with pytest.raises(InputError, match=name):
+            call()
+
+
 @pytest.mark.parametrize('wrong', [3, None, {'a': 1}, [1.0], b'test.csv'], ids=repr)
 def test_what_is_no_record_is_refused(wrong: Any) -> None:
     """A message says what may be given."""

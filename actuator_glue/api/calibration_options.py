@@ -12,7 +12,7 @@ from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.prior import DRIFT, check_prior
 from actuator_glue.errors import InputError
-from actuator_glue.given import number, take_numbers
+from actuator_glue.given import names, number, of_kind, one_of, take_numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,8 @@ class CalibrationOptions:
     use_force: bool = False
 
     def __post_init__(self) -> None:
-        effects = (self.effects,) if isinstance(self.effects, str) else tuple(self.effects)
+        of_kind(self.bounds, 'bounds', Mapping, 'lower and upper by name, as {"beta_1": (0, 800)}')
+        effects = names(self.effects, 'effects')
         bounds = {name: _limits(pair, name) for name, pair in dict(self.bounds).items()}
         for name, value in (
             ('effects', effects),
@@ -85,10 +86,7 @@ class CalibrationOptions:
             ('initial', ('auto', 'rest', 'measured')),
             ('sampler', ('adaptive', 'published')),
         ):
-            if getattr(self, name) not in known:
-                raise InputError(
-                    f'{name} {getattr(self, name)!r} is unknown; use one of {", ".join(known)}'
-                )
+            one_of(getattr(self, name), name, known)
 
 
 class CalibrationChanges(TypedDict, total=False):

@@ -166,7 +166,7 @@ def combinations(
     Example:
         >>> found = combinations('clamped.csv')  # doctest: +SKIP
     """
-    options = chosen(options or CalibrationOptions(), changes, 'combinations')
+    options = chosen(CalibrationOptions() if options is None else options, changes, 'combinations')
     if options.prior is not None or options.use_force:
         raise InputError(
             'an earlier calibration and the force as evidence need the specimen stiffness; give '

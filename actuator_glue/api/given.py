@@ -45,7 +45,7 @@ def records_given(
     if not some:
         raise InputError(f'{name}: no record given')
     known: list[Any] = [stiffness] * len(some)
-    if np.ndim(stiffness or 0.0) == 1:
+    if np.ndim(0.0 if stiffness is None else np.asarray(stiffness, dtype=object)) == 1:
         known = list(np.asarray(stiffness))
         if len(known) != len(some):
             raise InputError(f'{len(known)} stiffnesses for {len(some)} {name}: one for each')

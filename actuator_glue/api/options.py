@@ -5,10 +5,11 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields, replace
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import of_kind
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -23,6 +24,8 @@ def chosen(options: Options, changes: Mapping[str, Any], function: str) -> Optio
     Raises:
         InputError: no such option, or a value that cannot be used.
     """
+    if not is_dataclass(options):
+        of_kind(options, 'options', (), f'the options of {function} as an object, or each by name')
     known = [f.name for f in fields(options)]
     unknown = sorted(set(changes) - set(known))
     if unknown:

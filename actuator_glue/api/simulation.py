@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from actuator_glue.api.given import seed_given
 from actuator_glue.errors import InputError
-from actuator_glue.given import number, take_numbers
+from actuator_glue.given import names, number, of_kind, one_of, take_numbers, vector
 from actuator_glue.model import benchmark_plant, commands
 from actuator_glue.model.effects import scale
 from actuator_glue.model.parameters import TABLE_2
@@ -63,6 +63,7 @@ class Command:
         """
         if self.seed < 0:
             raise InputError(f'seed {self.seed} is negative')
+        one_of(self.shape, 'command', SHAPES)
         rate, duration, peak = self.rate, self.duration, self.amplitude
         if self.shape == 'sweep':
             return commands.sweep(rate, duration, self.low or 0.0, self.high, peak)
@@ -71,9 +72,7 @@ class Command:
         if self.shape == 'noise':
             low = 0.1 if self.low is None else self.low
             return commands.noise(rate, duration, low, self.high, peak, self.seed)
-        if self.shape == 'earthquake':
-            return commands.earthquake(rate, duration, peak, self.seed)
-        raise InputError(f'command {self.shape!r} is unknown; use one of {", ".join(SHAPES)}')
+        return commands.earthquake(rate, duration, peak, self.seed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +131,10 @@ def simulate(
     shape = Command() if command is None else command
     samples = samples_of(shape)
     rate = shape.rate
-    sensors = sensors or Sensors()
+    sensors = Sensors() if sensors is None else sensors
+    of_kind(sensors, 'sensors', Sensors, 'Sensors of a simulation')
+    one_of(plant, 'plant', ('paper', 'benchmark'))
+    one_of(hold, 'hold', ('zoh', 'linear'))
     words = seed if isinstance(seed, tuple) else (seed_given(seed), 0)
     sequence = np.random.SeedSequence(tuple(seed_given(word) for word in words))
     draw = int(sequence.generate_state(1)[0])
@@ -185,6 +187,7 @@ def samples_of(command: Command | Record) -> Array:
     Raises:
         InputError: a shape that cannot be made, or a record that moves in another unit.
     """
+    of_kind(command, 'command', (Command, Record), 'a Command, or a record whose command is used')
     return commands.in_metres(command) if isinstance(command, Record) else command.samples()
 
 
@@ -243,7 +246,11 @@ def sizes(effects: Effects = (), theta: ArrayLike | None = None) -> tuple[Struct
     Raises:
         InputError: unknown effect or parameter, or a value outside the catalogue's bounds.
     """
-    asked = dict(effects) if isinstance(effects, Mapping) else {name: {} for name in effects}
+    asked: dict[str, Mapping[str, float]] = (
+        dict(effects)
+        if isinstance(effects, Mapping)
+        else {name: {} for name in names(effects, 'effects')}
+    )
     for name, given in asked.items():
         if not isinstance(given, Mapping):
             raise InputError(
@@ -251,7 +258,7 @@ def sizes(effects: Effects = (), theta: ArrayLike | None = None) -> tuple[Struct
                 f'effects={{{name!r}: {{PARAMETER: VALUE}}}}, not as {given!r:.60}'
             )
     structure = Structure(tuple(asked))
-    base = TABLE_2 if theta is None else np.asarray(theta, dtype=np.float64)
+    base = TABLE_2 if theta is None else vector(theta, 'theta')
     if base.shape != (4,):
         raise InputError(f'theta has shape {base.shape}; Eq. (2) has four parameters')
     values = structure.neutral(base)

@@ -7,7 +7,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +22,7 @@ from actuator_glue.campaigns.recipe import Recipe, read_recipe
 from actuator_glue.campaigns.rows import RESULTS, RowFolder, content, fingerprint, key_of, needed
 from actuator_glue.campaigns.worker_task import carry_out, row_of
 from actuator_glue.errors import InputError
+from actuator_glue.given import of_kind, whole
 from actuator_glue.io.json_file import write_json
 from actuator_glue.json_value import json_fields
 
@@ -95,10 +96,15 @@ def campaign(
     """
     for module in ('distributed', 'pandas', 'pyarrow'):
         needed(module, 'a campaign')
-    if workers is not None and workers < 1:
+    if workers is not None and whole(workers, 'workers') < 1:
         raise InputError(f'workers {workers} is below 1')
-    given = [records] if isinstance(records, (str, os.PathLike)) else list(records)
+    several = isinstance(records, Iterable) and not isinstance(records, (str, os.PathLike))
+    given: list[Any] = list(records) if several else [records]  # type: ignore[arg-type]  # they are
+    for one in given:
+        of_kind(one, 'records', (str, os.PathLike), 'paths of files, bags or folders')
     if not isinstance(recipe, Recipe):
+        kinds = (str, os.PathLike, type(None))
+        of_kind(recipe, 'recipe', kinds, 'a Recipe, a YAML file of one, or None')
         recipe = Recipe() if recipe is None else read_recipe(recipe)
     tasks = tasks_of(given, recipe)
     rows = RowFolder(Path(out).resolve())

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.given import number, take_numbers
+from actuator_glue.given import number, of_kind, take_numbers
 from actuator_glue.records import Array, check_stiffness
 
 _LARGEST = 200  # degrees of freedom
@@ -35,6 +35,7 @@ class Specimen:
     def __post_init__(self) -> None:
         take_numbers(self)
         check_stiffness(self.stiffness, 'experimental')
+        of_kind(self.stddev, 'stddev', Mapping, 'standard deviations by name, as {"mass": 1.0}')
         stddev = {n: number(sd, f'standard deviation of {n}') for n, sd in self.stddev.items()}
         object.__setattr__(self, 'stddev', stddev)
         for name in ('mass', 'damping'):

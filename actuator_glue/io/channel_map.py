@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from reprlib import repr as brief
 from typing import Literal
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import of_kind
 from actuator_glue.io.units import ROLES, common_motion, of_file
 from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text, whole
 from actuator_glue.records import check_stiffness
@@ -117,6 +119,19 @@ def read_channel_map(path: Path | str) -> ChannelMap:
     hint = f'; {_QUOTES}' if _BRACKETS.search(text) else ''
     content = parse(text, f'{path}: channel map', hint)
     return parse_channel_map(content, str(path))
+
+
+def channel_map_given(given: ChannelMap | PathLike[str] | str | None) -> ChannelMap | None:
+    """Return a channel map that was given itself, or as a path or name; None for none.
+
+    Raises:
+        InputError: something else was given, or as `read_channel_map`.
+    """
+    if isinstance(given, (str, PathLike)):
+        return read_channel_map(Path(given))
+    kinds = (ChannelMap, type(None))
+    of_kind(given, 'channels', kinds, 'the YAML file of a channel map, a shipped one, or None')
+    return given
 
 
 def parse_channel_map(content: object, source: str) -> ChannelMap:

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
+from actuator_glue.given import one_of
 from actuator_glue.io.bag_reader import warn_caller
-from actuator_glue.io.channel_map import ChannelMap, read_channel_map
+from actuator_glue.io.channel_map import ChannelMap, channel_map_given
 from actuator_glue.io.laboratory import Channels, channels_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.records import Array, Hold, Record
@@ -105,10 +106,8 @@ def join(
     Example:
         >>> join('cmd.csv', 'daq.csv', by='correlation', stiffness=0.0)  # doctest: +SKIP
     """
-    if by not in get_args(By):
-        raise InputError(f'joining by {by!r} is unknown; use one of {", ".join(get_args(By))}')
-    if isinstance(channels, (str, Path)):
-        channels = read_channel_map(channels)
+    one_of(by, 'joining by', get_args(By))
+    channels = channel_map_given(channels)
     command = _part(command_file, channels, 'command')
     response = _part(response_file, channels, 'measured')
     times = command.values['time'], response.values['time']

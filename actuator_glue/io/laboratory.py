@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import cast
 
@@ -13,7 +14,8 @@ import numpy as np
 from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
-from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
+from actuator_glue.given import of_kind
+from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
 from actuator_glue.io.file_notes import noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
@@ -77,6 +79,7 @@ def read(
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
     """
+    way = None if resample is None else rate_and_way(resample)
     found = channels_of(path, channels)
     values, period = found.values, found.period
     said_hold = found.hold
@@ -86,13 +89,13 @@ def read(
         try:
             period = uniform_period(values['time'], source)
         except InputError:
-            if resample is None:
+            if way is None:
                 raise
-            made = resample_evenly(values, *rate_and_way(resample), where=source)
+            made = resample_evenly(values, *way, where=source)
             values, period = made.values, made.period
             warn(f'{path}: {made.told()}')
             source, said_hold = f'{path} ({made.name()})', said_hold or 'linear'
-    elif resample is not None:
+    elif way is not None:
         raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():
         column.flags.writeable = False  # nobody else has them: the record need not copy them
@@ -128,14 +131,14 @@ def channels_of(
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
     """
+    of_kind(path, 'file', (str, PathLike), 'the path of a file')
     path = Path(path)
     if not path.exists():
         raise InputError(f'{path}: there is no such file')
     refuse_pipe(path)
     if path.is_dir():
         raise InputError(f'{path}: this is a folder, and no bag in MCAP format')
-    if isinstance(channels, (str, Path)):
-        channels = read_channel_map(channels)
+    channels = channel_map_given(channels)
     if channels is not None:
         values, period, start_ns = _mapped(path, channels, needed)
         _refuse_empty(path, values)

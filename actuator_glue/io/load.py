@@ -11,11 +11,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import one_of
 from actuator_glue.io import laboratory
 from actuator_glue.io.bag_mapped import read_mapped
 from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
 from actuator_glue.io.bag_records import read_records
-from actuator_glue.io.channel_map import ChannelMap, read_channel_map
+from actuator_glue.io.channel_map import ChannelMap, channel_map_given
 from actuator_glue.io.resample import Resample
 from actuator_glue.records import Hold, Record, check_stiffness
 
@@ -96,8 +97,9 @@ def load_records(
     for path in paths:
         if not isinstance(path, (str, PathLike)):
             raise InputError(f'{type(path).__name__} is no path of a file or bag')
-    if isinstance(channels, (str, PathLike)):
-        channels = read_channel_map(Path(channels))
+    channels = channel_map_given(channels)
+    if hold is not None:
+        one_of(hold, 'hold', ('zoh', 'linear'))
     if channels is not None and hold is not None:
         channels = replace(channels, hold=hold)
     groups: list[list[Record]] = []

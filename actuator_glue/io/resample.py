@@ -19,6 +19,7 @@ from actuator_glue.even_times import (
     span,
     told_rate,
 )
+from actuator_glue.given import number, one_of
 from actuator_glue.records import Array
 
 By: TypeAlias = Literal['band-limited', 'lines']
@@ -127,8 +128,20 @@ class Resampled:
 
 
 def rate_and_way(resample: Resample) -> tuple[float, By]:
-    """Return the samples per second that are wanted [Hz], and how."""
-    return resample if isinstance(resample, tuple) else (resample, 'band-limited')
+    """Return the samples per second that are wanted [Hz], and how.
+
+    Raises:
+        InputError: no such rate, or no such way.
+    """
+    by: By = 'band-limited'
+    rate: object = resample
+    if isinstance(resample, tuple) and len(resample) == 2:
+        rate, by = resample
+    one_of(by, 'resampling by', get_args(By))
+    found = number(rate, 'resample')
+    if not 0.0 < found < np.inf:
+        raise InputError(f'resample is {found:g}; give samples per second, more than 0')
+    return found, by
 
 
 def resample_evenly(
@@ -151,8 +164,7 @@ def resample_evenly(
             even, or do not tell whose clock that is; a gap; or a rate far from that of the
             samples.
     """
-    if by not in get_args(By):
-        raise InputError(f'resampling by {by!r} is unknown; use one of {", ".join(get_args(By))}')
+    one_of(by, 'resampling by', get_args(By))
     time = values['time']
     steps = np.diff(time)
     channels = {role: column for role, column in values.items() if role != 'time'}

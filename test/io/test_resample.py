@@ -165,7 +165,7 @@ def test_a_command_that_lines_cut_is_told_with_a_rate_that_keeps_it() -> None:
     [
         (TIME, 2, r'26\.\d+ samples per second; resample to between 2\.\d+ and 26\d'),
         (TIME, 300, 'not 300'),
-        (TIME, -1, 'not -1'),
+        (TIME, -1, 'resample is -1'),
         (TIME + 3.0 * (TIME > 50.0), 27, r'3\.\d+ s without samples .*nobody knows'),
         (
             np.where(np.arange(COUNT) == 50, TIME[48], TIME),
