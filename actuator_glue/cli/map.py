@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print columns and proposal; 1 where the file cannot be used, with a map or without.
+    """Print columns and proposal; 1 where the file is refused with the map, or can have none.
 
     Raises:
         InputError: the file cannot be read, or holds no numbers.
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         say(f'{args.out}: written; check it, then `info {args.file} --channels {args.out}`', args)
     if plain:
         say(f'{args.file} needs no channel map: it is read as it is', args)
-    elif refused:
+    if refused and (text or not plain):
         note(refused)
     content = {
         'schema': 'actuator_glue.map/1',
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
         'problem': refused or None,
     }
     write_json(content, args.json)
-    return 1 if refused and not plain else 0
+    return 1 if refused and (text or not plain) else 0
 
 
 def map_text(found: FileLook, proposal: ProposedMap) -> str:

@@ -41,6 +41,19 @@ def write(path: Path, head: str, columns: list[np.ndarray], delimiter: str = ','
     return path
 
 
+def test_a_rate_that_the_clock_contradicts_is_no_answer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file needs no map, and the one with this rate would be refused: it is said, code 1."""
+    command, measured, _ = channels()
+    path = write(tmp_path / 'a.csv', 'time_s,command_mm,measured_mm', [TIME, command, measured])
+    found = looked(tmp_path, path, '--rate', '256', code=1)
+    assert (found['needed'], found['works']) == (False, False)
+    assert 'with this map the file is refused' in capsys.readouterr().err
+    assert 'said to be 256 Hz, but by its column of times it is 512 Hz' in found['problem']
+    assert looked(tmp_path, path)['works']
+
+
 @pytest.mark.parametrize('seed', range(4))
 def test_channels_without_names_are_told_by_what_they_do(tmp_path: Path, seed: int) -> None:
     """The one that follows is measured; the proposal reads the file; a force is not guessed."""
