@@ -46,6 +46,7 @@ class Scan:
         finished: the file has its footer.
         position: first byte that is not read yet.
         orphans: messages without a known topic.
+        count: whole messages so far.
         beside: called with each whole attachment and metadata record, opcode and content.
     """
 
@@ -56,6 +57,7 @@ class Scan:
     finished: bool = False
     position: int = 0
     orphans: int = 0
+    count: int = 0
     beside: Callable[[int, bytes], None] = lambda opcode, body: None
 
     def messages(self, follow: bool = False) -> Iterator[tuple[Schema, Channel, Message]]:
@@ -117,16 +119,26 @@ class Scan:
             elif whole:
                 file.seek(length, 1)
             if body and opcode == Opcode.CHUNK:
-                yield from self._chunk(body, at, whole)
+                for each in self._chunk(body, at, whole):
+                    self.count += 1
+                    yield each
             elif body and (found := self._record(opcode, body, at)) is not None:
+                self.count += 1
                 yield found
             self.position = file.tell()
             if not whole:
-                self.note(
-                    f'{self.path}: cut off after {at} of its bytes (a killed recorder, a full '
-                    f'disk or an incomplete copy); `actuator-glue recover` mends it'
-                )
+                self.note(self._cut(size))
                 return
+
+    def _cut(self, size: int) -> str:
+        """Return what is said of a file that ends within a record, or before the first."""
+        if not size:
+            return f'{self.path}: is empty (0 bytes): there is nothing to recover'
+        held = f'with {self.count} whole messages; `actuator-glue recover` mends it'
+        if not self.count:
+            held = 'without one whole message: there is nothing to recover'
+        why = 'a killed recorder, a full disk or an incomplete copy'
+        return f'{self.path}: cut off after {size} bytes ({why}), {held}'
 
     def _record(self, opcode: int, body: bytes, at: int) -> tuple[Schema, Channel, Message] | None:
         """Take a schema or channel; return a message with both, where there is one to be used."""

@@ -66,7 +66,10 @@ def recover(path: Path | str) -> Recovery:
     metadata.parts = [part for part in metadata.parts if part.count]
     if not metadata.parts:
         detail = f' ({recovery.notes[0]})' if recovery.notes else ''
-        raise InputError(f'{path}: not one whole message can be recovered{detail}')
+        raise InputError(
+            f'{path}: not one whole message can be recovered{detail}; copy it again from where it '
+            'was recorded, if it is whole there'
+        )
     recovery.messages = sum(part.count for part in metadata.parts)
     start = min(part.start for part in metadata.parts)
     recovery.seconds = (max(part.stop for part in metadata.parts) - start) * 1e-9

@@ -162,6 +162,27 @@ def test_recover_gives_back_everything_before_the_cut(bag: Path, record: Record)
     assert again.notes == []
 
 
+def test_what_a_cut_left_is_said(tmp_path: Path, whole: bytes) -> None:
+    """How much is there, and `recover` only where it mends something."""
+    path = tmp_path / 'cut.mcap'
+    ends = list(_message_ends(whole))
+    for size, said in (
+        (0, r'is empty \(0 bytes\): there is nothing to recover$'),
+        (
+            60,
+            r'cut off after 60 bytes .*, without one whole message: there is nothing to recover$',
+        ),
+        (ends[6] + 1, f'cut off after {ends[6] + 1} bytes .*, with 7 whole messages; .* mends it'),
+    ):
+        path.write_bytes(whole[:size])
+        with pytest.raises(InputError, match=said):
+            list(bag_messages(path))
+        if size < ends[0]:
+            with pytest.raises(InputError, match='not one whole message') as found:
+                recover(path)
+            assert 'mends it' not in str(found.value)
+
+
 def test_recover_writes_a_lost_metadata_file(bag: Path) -> None:
     """A bag without metadata.yaml but with whole files only lacks that."""
     before = yaml.safe_load((bag / 'metadata.yaml').read_text())
