@@ -33,6 +33,8 @@ FAULTS = {
     'restarts': 'times the sender began to count anew',
     'interruptions': 'times the connection broke: a gap as long as the silence',
     'malformed': 'messages do not fit the layout and were left out',
+    'untimed': 'samples have a time that is no number and were stamped by their counter',
+    'clock set': "times the sender's clock was set while its counter went on",
     'coarse': 'samples have a float32 counter or time too large to count on, and were left out',
     'not authentic': 'messages have no valid signature and were left out',
     'senders refused': 'messages came from senders that are not allowed',

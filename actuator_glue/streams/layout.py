@@ -178,10 +178,11 @@ class Layout:
         rate: float,
         fresh: bool = False,
     ) -> tuple[Rows, Counter[str]]:
-        """Return samples in SI units, and how many are left out, by the reason.
+        """Return samples in SI units, and how many have a fault, by its name.
 
-        Reasons: `malformed`, counter or time is no number; `coarse`, counter or time is a float32
-        that no longer tells one sample from the next.
+        Left out: `malformed`, what tells the order (counter, else time) is no number; `coarse`, it
+        is a float32 that no longer tells one sample from the next. Kept: `untimed`, the counter is
+        good and the time no number, which is NaN then.
 
         Args:
             values: by field, as sent, each of shape (n,).
@@ -195,12 +196,19 @@ class Layout:
             if counter is not None and counter.dtype.kind == 'f':
                 good &= np.abs(counter) < 2.0**53  # NaN compares as False
             si = {n: f.si(values[n]) for n, f in self.fields.items() if n != 'counter'}
+            untimed = np.zeros(len(good), dtype=bool)
             if 'time' in si:
-                good &= np.abs(si['time']) < 1e11
+                timed = np.abs(si['time']) < 1e11
+                if counter is None:
+                    good &= timed
+                else:
+                    untimed = good & ~timed
+                    si['time'] = np.where(timed, si['time'], np.nan)
             order = next((n for n in ('counter', 'time') if n in self.fields), None)
             coarse = good & self.coarse(order, values[order], rate) if order else ~good
         left_out = Counter(malformed=int((~good).sum()), coarse=int((coarse & good).sum()))
         good &= ~coarse
+        left_out['untimed'] = int((untimed & good).sum())
         if not good.all():
             si = {name: column[good] for name, column in si.items()}
             counter = None if counter is None else counter[good]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -13,7 +14,7 @@ from actuator_glue.clock_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.errors import InputError
 from actuator_glue.io.units import FLOAT32_COUNTS
 from actuator_glue.records import Array
-from actuator_glue.streams.clock import ClockMap
+from actuator_glue.streams.clock import HELD_UP, STEP, ClockMap
 from actuator_glue.streams.layout import TYPES, Layout, Rows
 from actuator_glue.streams.sequence import Run, Sequence
 
@@ -89,6 +90,9 @@ class Reception:
         self._arrived = 0
         self._last_time: float | None = None
         self._last_arrival = 0.0
+        # Index and time of the newest sample that has a time: as it came, and as it was stamped.
+        self._timed: tuple[int, float] | None = None
+        self._clocked = 0, 0.0
 
     def warnings(self, modulus: int | None) -> list[str]:
         """Return warnings of faults that cannot be seen in such a stream."""
@@ -176,25 +180,63 @@ class Reception:
 
     def _stamped(self, runs: list[Run], arrival_ns: int) -> list[Samples]:
         found = []
-        for place, run in enumerate(runs):
+        parts = [part for run in runs for part in self._by_setting(run)]
+        for place, (run, anew) in enumerate(parts):
             if run.began:
-                self.clock = ClockMap()
                 self._rates.begin()
-            times = run.rows[:, 3]
+                self._clocked = 0, 0.0
+            if anew:
+                self.clock = ClockMap()
             final = run.index + len(run.rows) - 1
-            first, last, timed = run.index / self.rate, final / self.rate, False
-            if not np.isnan(times).any():
-                first, last, timed = float(times[0]), float(times[-1]), True
-            if place == len(runs) - 1:
+            first, _ = self._time(run.index, run.rows[0, 3])
+            last, timed = self._time(final, run.rows[-1, 3])
+            if place == len(parts) - 1:
                 self.clock.update(last, arrival_ns)
                 self._rates.push(final, last if timed else None, arrival_ns * 1e-9)
-            elif run.began:
+            elif anew:
                 self.clock.update(first, arrival_ns)
             stamp = self.clock.stamp_ns(first, last)
             force = run.rows[:, 2] if self._force else None
             command, measured = run.rows[:, 0], run.rows[:, 1]
             found.append(Samples(run.index, stamp, command, measured, force, run.began))
         return found
+
+    def _time(self, index: int, time: float) -> tuple[float, bool]:
+        """Return a sample's time by the sender's clock [s], and whether it was sent.
+
+        Where it was not, it follows from the last one that was; without any from the index.
+        """
+        if not np.isnan(time):
+            self._clocked = index, float(time)
+            return float(time), True
+        at, known = self._clocked
+        return known + (index - at) / self.rate, False
+
+    def _by_setting(self, run: Run) -> list[tuple[Run, bool]]:
+        """Part a run where the sender's clock was set while its counter went on.
+
+        Returns:
+            Parts, and whether the sender's clock is another one from each on.
+        """
+        if run.began:
+            self._timed = None
+        at = np.flatnonzero(~np.isnan(run.rows[:, 3]))
+        if not len(at):
+            return [(run, run.began)]
+        index, times = (at + run.index).astype(np.float64), run.rows[at, 3]
+        known = (index[0], times[0]) if self._timed is None else self._timed
+        steps = np.diff(times, prepend=known[1])
+        samples = np.diff(index, prepend=known[0]) / self.rate
+        set_anew = (steps < -STEP) | (steps > HELD_UP + 1.5 * samples)
+        self.counts['clock set'] += int(set_anew.sum())
+        set_anew[0] |= self._timed is None  # what came before had no time
+        self._timed = int(index[-1]), float(times[-1])
+        cuts = sorted({0, *at[set_anew].tolist()})
+        begins = {*at[set_anew].tolist(), *([0] if run.began else [])}
+        return [
+            (Run(run.index + a, run.rows[a:b], run.began and not a), a in begins)
+            for a, b in pairwise([*cuts, len(run.rows)])
+        ]
 
 
 class _Rates:

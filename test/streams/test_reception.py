@@ -126,3 +126,58 @@ def test_stamps_never_go_back(block, held, rng_seed):
     edges = [(s.stamp_ns, s.stamp_ns + (len(s.command) - 1) * 1_000_000) for s in found]
     for (_, last), (first, _) in pairwise(edges):
         assert first > last
+
+
+def test_a_time_that_is_no_number_drops_no_sample():
+    """The counter tells the order: such samples are kept, counted, and stamped by the others."""
+    table = np.zeros((300, 5))
+    table[:, 0] = np.arange(300)
+    table[:, 1] = 50.0 + np.arange(300) / 100.0
+    table[100:200, 1] = np.nan
+    reception, found, untimed = Reception(PLAIN, 100.0), [], 0
+    for row in table:
+        values = dict(zip(PLAIN.fields, row[:, None], strict=True))
+        rows, faults = PLAIN.rows(values, START + round(row[0] * 1e7), 100.0)
+        untimed += faults['untimed']
+        assert not faults['malformed']
+        found += reception.push(rows, row[0] / 100.0)
+    assert untimed == 100
+    stamps = np.concatenate([s.stamp_ns + np.arange(len(s.command)) * 10_000_000 for s in found])
+    assert len(stamps) > 290
+    np.testing.assert_allclose(
+        (stamps - stamps[0]) * 1e-9, np.arange(len(stamps)) / 100, atol=0.06
+    )
+
+
+@pytest.mark.parametrize('moved', [-1.5, -3600.0, 3600.0])
+@pytest.mark.parametrize('block', [1, 10, 64])
+def test_a_clock_that_is_set_under_a_running_counter_is_told(moved, block):
+    """No stamp is off by what it was set; it is counted once, and no sample is lost."""
+    reception, found = Reception(PLAIN, 200.0), []
+    for first in range(0, 900, block):
+        index = np.arange(first, first + block)
+        time = index / 200.0 + np.where(index >= 301, moved, 0.0)
+        values = 1e-3 * np.sin(0.1 * index)
+        now = (first + block) / 200.0
+        rows = Rows(values, values, None, index, time, START + round(now * 1e9))
+        found += reception.push(rows, now)
+    assert reception.counts['clock set'] == 1
+    assert not reception.counts['lost'] and not reception.counts['restarts']
+    index = np.concatenate([s.index + np.arange(len(s.command)) for s in found])
+    stamps = np.concatenate([s.stamp_ns + np.arange(len(s.command)) * 5_000_000 for s in found])
+    np.testing.assert_array_equal(index, np.arange(len(index)))
+    off = (stamps - START) * 1e-9 - index / 200.0
+    assert np.abs(off).max() < 0.4  # a block, not what the clock was set by
+
+
+def test_a_time_in_whole_seconds_is_no_clock_that_is_set():
+    """It stands still and goes on by one: that is how coarse it is."""
+    reception = Reception(PLAIN, 200.0)
+    index = np.arange(2000)
+    for first in range(0, 2000, 10):
+        part = index[first : first + 10]
+        values = np.zeros(10)
+        arrival = START + round(part[-1] * 5e6)
+        rows = Rows(values, values, None, part, np.floor(part / 200.0), arrival)
+        reception.push(rows, part[-1] / 200.0)
+    assert not reception.counts['clock set']
