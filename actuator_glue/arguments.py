@@ -27,7 +27,7 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(f'{text!r} is not a number')
     if not math.isfinite(float(text)):
         raise argparse.ArgumentTypeError(f'{text!r} is not finite')
-    return float(text)
+    return float(text) + 0.0  # -0 is 0
 
 
 def duration(text: str) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import actuator_glue as ag
@@ -272,6 +273,16 @@ def test_what_is_no_record_is_refused(wrong: Any) -> None:
     for call in (api.calibrate, api.diagnose, api.replay, api.load, api.load_records):
         with pytest.raises(InputError, match=r'is no|no such|cannot'):
             call(wrong)
+
+
+def test_what_holds_more_than_paths_is_refused(file: Path) -> None:
+    """Columns of a table, keys of a mapping, lines of an open file are not taken for paths."""
+    table = pd.DataFrame({'time_s': [0.0, 0.1], 'command_mm': [0.0, 1.0]})
+    with file.open() as opened:
+        for wrong in (table, {str(file): 1}, opened):
+            for call in (api.calibrate, api.load, api.load_records):
+                with pytest.raises(InputError, match=f'{type(wrong).__name__} is no'):
+                    call(wrong)
 
 
 def test_nothing_is_refused(file: Path) -> None:

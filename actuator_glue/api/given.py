@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from typing import Any, TypeAlias
@@ -35,7 +36,9 @@ def records_given(
         InputError: something else was given, or a file cannot be read.
     """
     some: list[Any]
-    if isinstance(given, (Record, str, os.PathLike)):
+    # Columns of a table, keys of a mapping and lines of an open file are no records.
+    whole_thing = isinstance(given, (Mapping, io.IOBase)) or hasattr(given, 'columns')
+    if isinstance(given, (Record, str, os.PathLike)) or whole_thing:
         some = [given]
     else:
         try:
@@ -58,7 +61,8 @@ def records_given(
         else:
             raise InputError(
                 f'{name}: {type(one).__name__} is no record; give what `load` or `simulate` '
-                'return, the path of a file or bag, or a list of these'
+                'return, the path of a file or bag, or a list of these; `Record.from_arrays` '
+                'makes a record of columns'
             )
     motions = dict.fromkeys(record.motion for record in out)
     if len(motions) > 1:

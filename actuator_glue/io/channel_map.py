@@ -181,6 +181,8 @@ def _channel(content: object, role: str, where: str) -> Channel:
     of_file(role, str(values['unit']) if values['unit'] else None, where)
     number(values, 'scale', where)
     number(values, 'offset', where)
+    if values.get('scale') == 0.0:
+        raise InputError(f'{where}: scale is 0; every value would be the same')
     if not isinstance(values.get('remove_rest_offset', False), bool):
         raise InputError(f'{where}: remove_rest_offset must be true or false')
     return Channel(**values)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -89,14 +90,18 @@ def load_records(
         InputError: a path cannot be used, its rate or stroke is none of a servo-hydraulic test, or
             the number of stiffnesses does not fit.
     """
-    if isinstance(paths, (str, PathLike)) or not isinstance(paths, Iterable):
-        paths = [paths]
+    whole_thing = isinstance(paths, (Mapping, io.IOBase)) or hasattr(paths, 'columns')
+    if isinstance(paths, (str, PathLike)) or whole_thing or not isinstance(paths, Iterable):
+        paths = [paths]  # type: ignore[list-item]  # what is no path is refused below
     paths = list(paths)
     if not paths:
         raise InputError('no record given')
     for path in paths:
         if not isinstance(path, (str, PathLike)):
-            raise InputError(f'{type(path).__name__} is no path of a file or bag')
+            raise InputError(
+                f'{type(path).__name__} is no path of a file or bag; give a path, as in '
+                "load('test.csv')"
+            )
     channels = channel_map_given(channels)
     if hold is not None:
         one_of(hold, 'hold', ('zoh', 'linear'))

@@ -95,6 +95,11 @@ def refuse_foreign(path: Path, wanted: str) -> bytes:
     return start
 
 
+def is_text(start: bytes) -> bool:
+    """Return whether a file that begins so is text: there is something, and no byte of binary."""
+    return bool(start) and _CONTROL.isdisjoint(start)
+
+
 def text_encoding(path: Path) -> str:
     """Return how the text of a file is coded: UTF-8, UTF-16, UTF-32 or Windows-1252.
 

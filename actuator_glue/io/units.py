@@ -43,6 +43,7 @@ _NAME = re.compile(
     re.IGNORECASE,
 )
 _BRACKETS = re.compile(r'[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]')
+_OF_MATRIX = re.compile(r'\((?::,\d+|\d+,:)\)\s*$')  # which column of a matrix, as MATLAB says it
 _MOVING = ('command', 'measured')
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
 _KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values())
@@ -135,7 +136,7 @@ def recognise(name: str) -> tuple[str, str] | None:
 
     The unit is empty where the name has none; None where the name is no role.
     """
-    match = _NAME.fullmatch(name.strip())
+    match = _NAME.fullmatch(_OF_MATRIX.sub('', name).strip())
     if match is None:
         return None
     return match['role'].lower(), match['unit'] or ''
@@ -218,7 +219,11 @@ def choose(
             continue
         role, unit = recognised
         if role in found:
-            raise InputError(f'{where}: two columns are called {role}; keep one')
+            first = names[found[role][0]].strip()
+            raise InputError(
+                f'{where}: two columns are called {role}, {first!r} and {name.strip()!r}; keep '
+                'one, or name the one that is meant in a channel map'
+            )
         written[role] = unit or stated
         place = f'{where}: column {name.strip()!r}'
         if contradict(unit, stated):

@@ -73,7 +73,7 @@ def hdf5(path: Path) -> None:
     with h5py.File(path, 'w') as file:
         for name, values in COLUMNS.items():
             file.create_dataset(f'run/{name}', data=values, compression='gzip')
-            file[f'run/{name}'].attrs['units'] = 'mm'
+            file[f'run/{name}'].attrs['units'] = name.rpartition('_')[2]
 
 
 def tdms(path: Path) -> None:
@@ -82,7 +82,7 @@ def tdms(path: Path) -> None:
         for part in (slice(0, 100), slice(100, 101), slice(101, COUNT)):
             writer.write_segment(
                 [
-                    ChannelObject('run', n, v[part], {'unit_string': 'mm'})
+                    ChannelObject('run', n, v[part], {'unit_string': n.rpartition('_')[2]})
                     for n, v in COLUMNS.items()
                 ]
             )

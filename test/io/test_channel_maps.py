@@ -53,6 +53,7 @@ def test_a_map_reads_any_text(tmp_path: Path, said: dict[str, str]) -> None:
         ({'measured': {'column': 1.5, 'unit': 'mm'}}, 'name or a number'),
         ({'measured': {'column': 1, 'unit': 'mm', 'scale': 'x'}}, 'scale must be a number'),
         ({'measured': {'column': 1, 'unit': 'mm', 'remove_rest_offset': True}}, 'rest_samples'),
+        ({'measured': {'column': 1, 'unit': 'mm', 'scale': 0}}, 'scale is 0; every value would'),
         ({'measured': 3}, 'must be a mapping'),
         ({'rate': None}, 'give `rate`'),
         ({'rate': -5}, 'outside'),

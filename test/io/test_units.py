@@ -143,3 +143,40 @@ def test_units_said_twice_alike_are_read(tmp_path: Path, units: str) -> None:
     names, rows = path.read_text().split('\n', 1)
     path.write_text(f'{names}\n{units}\n{rows}')
     np.testing.assert_allclose(read(path).measured, MEASURED * 1e-3, atol=1e-9)
+
+
+def test_a_pipe_parts_columns(tmp_path: Path) -> None:
+    """As other delimiters do, with decimal commas, too; `map` sees the same columns."""
+    path = table(tmp_path / 'a.csv', ['time_s', 'command_mm', 'measured_mm'], '|')
+    for text in (path.read_text(), path.read_text().replace('.', ',')):
+        path.write_text(text)
+        np.testing.assert_allclose(read(path).measured, MEASURED * 1e-3, atol=1e-9)
+        assert [column.label for column in look(path).columns][1:] == ['command_mm', 'measured_mm']
+
+
+@pytest.mark.parametrize('zone', ['', 'Z', ' UTC', ' GMT', '+0000', '+00:00', ' +00:00'])
+def test_zones_of_times(tmp_path: Path, zone: str) -> None:
+    """Every way to write one: nothing is said to have no unit."""
+    stamps = np.datetime64('2024-10-27T12:00:00', 'ms') + np.arange(COUNT)
+    rows = zip(stamps, COMMAND, MEASURED, strict=True)
+    path = tmp_path / 'a.csv'
+    text = '\n'.join(f'{s}{zone},{c:.6f},{m:.6f}' for s, c, m in rows)
+    path.write_text(f'time,command_mm,measured_mm\n{text}\n')
+    record = read(path)
+    assert (record.period, record.start_ns) == (1e-3, 1_730_030_400 * 10**9)
+
+
+def test_columns_of_one_matrix_are_told_apart(tmp_path: Path) -> None:
+    """A matrix that is called command has two of them: both are named."""
+    with h5py.File(tmp_path / 'a.h5', 'w') as file:
+        file['time_s'], file['measured_mm'] = TIME, MEASURED
+        file['command_mm'] = np.column_stack([COMMAND, COMMAND])
+    with pytest.raises(InputError, match=r"'command_mm\(:,1\)' and 'command_mm\(:,2\)'; keep one"):
+        read(tmp_path / 'a.h5')
+
+
+def test_text_that_is_called_mat(tmp_path: Path) -> None:
+    """It is not damaged."""
+    path = table(tmp_path / 'a.mat', ['time_s', 'command_mm', 'measured_mm'])
+    with pytest.raises(InputError, match=r'this is text, not a MATLAB \.mat file; give it a name'):
+        read(path)

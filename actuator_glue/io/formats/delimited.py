@@ -23,8 +23,9 @@ from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows read or written at a time
 _LOOK = 100  # rows that tell how a text is laid out
-# A comma may be the decimal sign where there is another delimiter, so it comes last.
-DELIMITERS = (';', '\t', ',')
+# A comma may be the decimal sign where there is another delimiter, so it comes behind the usual
+# ones.
+DELIMITERS = (';', '\t', ',', '|')
 _NOTHING = ' \r\n\x1a'  # all that a line without entries may hold; DOS ends a file with the last
 _NUMBER = re.compile(
     r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)', re.ASCII | re.IGNORECASE
@@ -40,7 +41,7 @@ _STAMP = re.compile(
     rf'|(?P<day_3>\d{{1,2}})[- ](?P<name>{"|".join(_MONTHS)})[- ](?P<year_3>\d{{4}})'
     r'|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d\d))(?:T|,? ))?'
     r'(?P<hour>\d{1,2})(?P<clock>:\d\d:\d\d)(?:[.,](?P<fraction>\d+))?'
-    r'(?: ?(?P<half>[ap])\.?m\.?)?(?P<zone>Z|[+-]\d\d:\d\d)?',
+    r'(?: ?(?P<half>[ap])\.?m\.?)?(?: ?(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d))?',
     re.ASCII | re.IGNORECASE,
 )
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
@@ -300,10 +301,9 @@ def _seconds(entry: str) -> float:
     if half:
         hour = hour % 12 + (12 if half == 'p' else 0)
     date = '1970-01-01' if year is None else f'{year}-{month or "":0>2}-{day or "":0>2}'
+    zone = (stamp['zone'] or 'UTC').upper().replace('UTC', 'Z').replace('GMT', 'Z')
     try:
-        whole = datetime.fromisoformat(
-            f'{date}T{hour:02d}{stamp["clock"]}{(stamp["zone"] or "+00:00").upper()}'
-        )
+        whole = datetime.fromisoformat(f'{date}T{hour:02d}{stamp["clock"]}{zone}')
     except ValueError:  # 25:00:00
         return np.nan
     return whole.timestamp() + float(f'0.{stamp["fraction"] or 0}')

@@ -25,7 +25,7 @@ from actuator_glue.io.formats import (
 from actuator_glue.io.formats.hdf5 import has_objects, is_hdf5, named_by_structs, read_tree
 from actuator_glue.io.matlab_elements import check_elements
 from actuator_glue.io.matlab_objects import check_clocks, read_objects
-from actuator_glue.io.signature import refuse_foreign
+from actuator_glue.io.signature import is_text, refuse_foreign
 from actuator_glue.io.units import bare
 from actuator_glue.records import Array
 
@@ -39,7 +39,10 @@ def _content(path: Path) -> dict[str, Any]:
     """Return the variables of a file up to version 7."""
     from scipy.io import loadmat
 
-    refuse_foreign(path, 'a MATLAB .mat file')
+    if is_text(refuse_foreign(path, 'a MATLAB .mat file')):
+        raise InputError(
+            f'{path}: this is text, not a MATLAB .mat file; give it a name ending in .csv'
+        )
     with reading(path, 'a MATLAB .mat file'):
         check_elements(path)
         # A name that stands twice is warned of in the library's words; the last one is taken.
