@@ -99,11 +99,17 @@ class Setups:
     """The set-ups of one stream as they come: each holds from the sample it names.
 
     One that names a sample that has passed holds at once; of two that name the same sample the
-    later one holds.
+    later one holds. Where the stream begins again, those that came since its last block, or just
+    before it, are of the new numbering if one of them names the first sample or one before: each
+    holds anew from the sample it names. All others are forgotten, as their numbers were the old
+    ones.
     """
 
     def __init__(self) -> None:
         self._announced: list[StreamSetup] = []
+        # What came lately, and the running index that followed then: may be of a new numbering.
+        # Topics have no order among each other, so the last block may come after it.
+        self._lately: list[tuple[int, StreamSetup]] = []
 
     def announce(self, setup: StreamSetup, following: int | None) -> bool:
         """Take a set-up; return whether it holds at once.
@@ -112,22 +118,29 @@ class Setups:
             setup: what has come.
             following: running index of the sample after the last one; None before the first.
         """
-        if following is not None and setup.index <= following:
-            return True
-        self._announced = [s for s in self._announced if s.index != setup.index]
-        self._announced.append(setup)
-        self._announced.sort(key=lambda s: s.index)
-        del self._announced[_MOST:]
+        if following is not None:
+            self._lately.append((following, setup))
+            del self._lately[:-_MOST]
+            if setup.index <= following:
+                return True
+        self._announced = _in_order([*self._announced, setup])
         return False
 
-    def begun(self, index: int) -> list[StreamSetup]:
-        """Return, once, the announced set-ups that hold at a sample, the last one governs it."""
-        count = sum(s.index <= index for s in self._announced)
-        begun, self._announced = self._announced[:count], self._announced[count:]
-        return begun
+    def parts(
+        self, index: int, count: int, following: int | None
+    ) -> Iterator[tuple[slice, list[StreamSetup]]]:
+        """Yield the parts of `count` samples from `index` on, and what begins with each.
 
-    def parts(self, index: int, count: int) -> Iterator[tuple[slice, list[StreamSetup]]]:
-        """Yield the parts of `count` samples from `index` on, and what begins with each."""
+        Args:
+            index: running index of the first of them; where it went back the stream begins again.
+            count: how many.
+            following: as for `announce`.
+        """
+        if following is not None and index < following:
+            again = _in_order([setup for _, setup in self._lately])
+            self._announced = again if again and again[0].index <= index else []
+            self._lately.clear()
+        self._lately = [(said, setup) for said, setup in self._lately if said >= index]
         start = 0
         while start < count:
             begun = self.begun(index + start)
@@ -135,6 +148,21 @@ class Setups:
             yield slice(start, stop), begun
             start = stop
 
-    def forget(self) -> None:
-        """Forget what was announced: the stream's numbers begin again."""
-        self._announced.clear()
+    def ahead(self, index: int, count: int, following: int | None) -> list[StreamSetup | None]:
+        """Return what will govern each of those `parts`, None where what governs now goes on."""
+        looking = Setups()
+        looking._announced, looking._lately = [*self._announced], [*self._lately]
+        parts = looking.parts(index, count, following)
+        return [begun[-1] if begun else None for _, begun in parts]
+
+    def begun(self, index: int) -> list[StreamSetup]:
+        """Return, once, the announced set-ups that hold at a sample, the last one governs it."""
+        count = sum(s.index <= index for s in self._announced)
+        begun, self._announced = self._announced[:count], self._announced[count:]
+        return begun
+
+
+def _in_order(setups: list[StreamSetup]) -> list[StreamSetup]:
+    """Return set-ups by the sample they name, the last one of each, no more than are kept."""
+    by_index = {setup.index: setup for setup in setups}
+    return [by_index[index] for index in sorted(by_index)][:_MOST]

@@ -318,9 +318,7 @@ class _Governing:
             self._stamp_ns = max(self._stamp_ns, taken.stamp_ns)
             if self._setups.announce(taken.setup, self._next):
                 self._current = taken.setup
-        if self._next is not None and block.index < self._next:
-            self._setups.forget()
-        for part, begun in self._setups.parts(block.index, len(block)):
+        for part, begun in self._setups.parts(block.index, len(block), self._next):
             self._current = begun[-1] if begun else self._current
             yield block.part(part.start, part.stop), self._current
         self._next = block.index + len(block)

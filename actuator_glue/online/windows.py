@@ -127,8 +127,9 @@ class SlidingWindows:
             self._step_over(block)
             return events, []
         events += self._follow(block)
+        following, self._next = self._next, block.index
         windows: list[Window] = []
-        for part, begun in self._setups.parts(block.index, len(block)):
+        for part, begun in self._setups.parts(block.index, len(block), following):
             events += self._begin_all(begun)
             self._append(block.part(part.start, part.stop), windows)
         self.tally.samples += len(block)
@@ -150,12 +151,19 @@ class SlidingWindows:
         return [event for setup in setups for event in self._begin(setup)]
 
     def _check_period(self, block: Block) -> None:
-        setup = self.current
-        if setup is not None and abs(block.period / setup.period - 1.0) > 1e-4:
-            raise InputError(
-                f'block at sample {block.index}: period {block.period:g} s, but the test set-up '
-                f'says {1.0 / setup.period:g} Hz; publish a set-up with the rate of the samples'
-            )
+        """Compare a block's period with the set-ups that will govern its samples.
+
+        Raises:
+            InputError: one of them says another rate.
+        """
+        for ahead in self._setups.ahead(block.index, len(block), self._next):
+            setup = ahead or self.current
+            if setup is not None and abs(block.period / setup.period - 1.0) > 1e-4:
+                raise InputError(
+                    f'block at sample {block.index}: period {block.period:g} s, but the test '
+                    f'set-up says {1.0 / setup.period:g} Hz; publish a set-up with the rate of '
+                    'the samples'
+                )
 
     def _check_rate(self, block: Block) -> None:
         """Compare stamps with index and period: a factor of two would look like a slow actuator.
@@ -184,8 +192,6 @@ class SlidingWindows:
         if self._next is None:
             return []
         if block.index < self._next:
-            # Announced set-ups of the old numbering would fire at the wrong samples.
-            self._setups.forget()
             message = (
                 f'sample index went back from {self._next} to {block.index}: the stream began '
                 'again, or two publishers share the topic'

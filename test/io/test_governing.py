@@ -93,3 +93,28 @@ def test_what_comes_late_reaches_back_where_its_stamp_says_so(
         writer.write('/test_setup', setup(record, 225, 5e4), 500)
     records = read_records(tmp_path / 'bag')
     assert [(len(r), r.stiffness) for r in records] == [(225, 0.0), (275, 5e4)]
+
+
+def test_a_stream_that_begins_again_with_set_ups_announced_ahead(
+    tmp_path: Path, record: Record
+) -> None:
+    """Calibration and replay take each from the sample it names, in the second test as well."""
+    lengths, stiffnesses = [225, 275] * 2, [0.0, 5e4, 7e4, 9e4]
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/samples', 'SampleBlock')
+        writer.add_topic('/test_setup', 'TestSetup')
+        for test in range(2):
+            one, at = replace(record, start_ns=record.start_ns + test * 10**10), 1000 * test
+            for index, stiffness in zip((0, 225), stiffnesses[2 * test :], strict=False):
+                writer.write('/test_setup', setup(one, index, stiffness), at)
+            for start in range(0, 500, 50):
+                writer.write('/samples', samples(one, start, start + 50), at + 1 + start)
+    records = read_records(tmp_path / 'bag')
+    assert [len(r) for r in records] == lengths
+    assert [r.stiffness for r in records] == stiffnesses
+    found = windows(tmp_path / 'bag')
+    told = [w.record.stiffness for w in found]
+    assert list(dict.fromkeys(told)) == stiffnesses and told == sorted(told)
+    for window in found:
+        first, after = window.record.first_index, window.record.stiffness in (5e4, 9e4)
+        assert first + len(window.record) <= 225 or (after and first >= 225)

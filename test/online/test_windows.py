@@ -202,6 +202,80 @@ def test_before_any_set_up_there_are_no_windows():
     assert [w.record.first_index for w in found] == [420, 460, 500]
 
 
+def stiffnesses(found):
+    """Return first and last sample of the windows under each stiffness, in their order."""
+    spans = []
+    for window in found:
+        record = window.record
+        last = record.first_index + len(record) - 1
+        if spans and spans[-1][0] == record.stiffness and spans[-1][2] < last:
+            spans[-1][2] = last
+        else:
+            spans.append([record.stiffness, record.first_index, last])
+    return [tuple(span) for span in spans]
+
+
+ONCE = [(0.0, 20, 399), (250e3, 420, 799)]
+PAIR = (setup(0.0), setup(250e3, index=400))
+
+
+@pytest.mark.parametrize('late', [0, 1])
+@pytest.mark.parametrize('stop', [300, 800])
+@pytest.mark.parametrize('order', [PAIR, PAIR[::-1]])
+def test_set_ups_of_a_stream_that_begins_again_hold_where_they_say(order, stop, late):
+    """Announced between the two, or just before the last block of the first; in any order."""
+    windows = SlidingWindows(SETTINGS)
+    for announced in PAIR:
+        windows.setup(announced)
+    first = list(cut([20] * (stop // 20)))
+    for one in first[: len(first) - late]:
+        windows.push(one)
+    for announced in order:
+        windows.setup(announced)
+    for one in first[len(first) - late :]:
+        windows.push(one)
+    found, events = [], []
+    for one in cut([20] * 40):
+        told, complete = windows.push(one)
+        events += told
+        found += complete
+    assert stiffnesses(found) == ONCE
+    assert {e.index for e in events if isinstance(e, Restarted)} == {0, 400}
+
+
+def test_what_was_announced_for_the_old_numbers_is_forgotten():
+    windows = SlidingWindows(SETTINGS)
+    for announced in PAIR:
+        windows.setup(announced)
+    for one in cut([20] * 10):
+        windows.push(one)
+    windows.setup(setup(1e3, index=600))
+    windows.push(block(0, 20))
+    found = [w for one in cut([20] * 39, start=20) for w in windows.push(one)[1]]
+    assert stiffnesses(found) == [(0.0, 20, 799)]
+
+
+@pytest.mark.parametrize('size', [20, 30])
+def test_a_rate_that_is_announced_ahead_holds_from_its_sample(size):
+    """A block across it has one period, which is wrong for a part of it: it is told and left."""
+    fast = 0.5 / RATE
+    windows = SlidingWindows(SETTINGS)
+    for announced in (setup(), setup(index=400, period=fast)):
+        windows.setup(announced)
+    found, events, stamp = [], [], 10**18
+    for index in range(0, 1600, size):
+        period = 1.0 / RATE if index < 400 else fast
+        told, complete = windows.push(block(index, size, period, stamp))
+        stamp += round(size * period * 1e9)
+        found += complete
+        events += told
+    rejected = [e for e in events if isinstance(e, Rejected)]
+    assert [e.message[:20] for e in rejected] == ['block at sample 390:'] * (size == 30)
+    assert {w.record.period for w in found if w.end <= 400} == {1.0 / RATE}
+    assert {w.record.period for w in found if w.end > 400} == {fast}
+    assert len([w for w in found if w.end > 400]) > 10
+
+
 def test_announced_set_ups_are_bounded():
     windows = SlidingWindows(SETTINGS)
     windows.setup(setup())
@@ -209,6 +283,7 @@ def test_announced_set_ups_are_bounded():
     for index in range(100, 5100):
         windows.setup(setup(index=index))
     assert len(windows._setups._announced) <= 16
+    assert len(windows._setups._lately) <= 16
 
 
 @pytest.mark.parametrize(
