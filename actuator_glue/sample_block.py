@@ -91,17 +91,27 @@ def check_block(block: Block) -> Block:
         raise InputError(f'{where}: channels have different lengths {lengths}')
     if not size:
         raise InputError(f'{where}: it is empty; leave out blocks without samples')
-    if size > MAX_BLOCK:
-        raise InputError(f'{where}: {size} samples are more than {MAX_BLOCK}')
-    if not 0 <= block.index <= MAX_INDEX:
-        raise InputError(f'{where}: the running index is outside [0, {MAX_INDEX}]')
-    if not 1e-6 <= block.period <= 10.0:
-        raise InputError(f'{where}: period {block.period:g} s is outside [1e-6, 10] s')
+    check_times(block)
     _check_channel(where, block.index, 'command', block.command, 'm', MAX_DISPLACEMENT)
     _check_channel(where, block.index, 'measured', block.measured, 'm', MAX_DISPLACEMENT)
     if block.force is not None:
         _check_channel(where, block.index, 'force', block.force, 'N', MAX_FORCE)
     return block
+
+
+def check_times(block: Block) -> None:
+    """Refuse a block of which nobody can say when its samples were.
+
+    Raises:
+        InputError: an absurd period or running index, or far too many samples.
+    """
+    where = f'block at sample {block.index}'
+    if len(block) > MAX_BLOCK:
+        raise InputError(f'{where}: {len(block)} samples are more than {MAX_BLOCK}')
+    if not 0 <= block.index <= MAX_INDEX:
+        raise InputError(f'{where}: the running index is outside [0, {MAX_INDEX}]')
+    if not 1e-6 <= block.period <= 10.0:
+        raise InputError(f'{where}: period {block.period:g} s is outside [1e-6, 10] s')
 
 
 def _check_channel(

@@ -25,7 +25,7 @@ from actuator_glue.io.bag_records import without_samples
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
 from actuator_glue.motion import METRES
-from actuator_glue.sample_block import Block, from_message
+from actuator_glue.sample_block import Block, check_times, from_message
 from actuator_glue.setups import known_stiffness
 from actuator_glue.view.explanations import Explanation, diagnosed, explanations, number, said
 from actuator_glue.view.history import History
@@ -80,6 +80,9 @@ class Intake:
             kind: bare name of its type.
             message: the message.
             place: of its first sample, or at which it was received; None for what comes now.
+
+        Raises:
+            InputError: samples that have no place in time; nothing of them is taken.
         """
         with self.lock:
             self._place = place
@@ -207,10 +210,16 @@ class Intake:
 def shown(message: Any) -> Block | None:
     """Return the block of a SampleBlock, NaN and all: a fault is what somebody looks for.
 
-    None where it holds no samples, or none whose time is known.
+    None where it holds no samples, or channels of different lengths.
+
+    Raises:
+        InputError: nobody can say when its samples were: an absurd period or running index.
     """
     block = from_message(message)
-    return block if len(block.measured) == len(block) > 0 and block.period > 0.0 else None
+    if not len(block.measured) == len(block) > 0:
+        return None
+    check_times(block)
+    return block
 
 
 def read_bag(path: Path | str, namespace: str | None = None, *, note: Note = refuse) -> Intake:

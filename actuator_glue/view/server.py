@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -157,6 +158,22 @@ class _Page:
         self._socket = socket
 
     async def send(self) -> None:
+        """Send frames; what fails is told, and the socket closed: the page says so and asks anew.
+
+        A page that gets nothing more, of an open socket, looks like a test that stands still.
+        """
+        try:
+            await self._frames_on()
+        except Exception as error:
+            print(
+                f'page: a frame could not be made ({type(error).__name__}: {error}); the page '
+                'connects anew. This is a fault of actuator-glue, please report it',
+                file=sys.stderr,
+                flush=True,
+            )
+            await self._socket.close(code=1011, message=b'a frame could not be made')
+
+    async def _frames_on(self) -> None:
         """Send a frame wherever there is something new, as fast as the page takes them."""
         shown: tuple[Wanted, int] | None = None
         loop, due = asyncio.get_running_loop(), 0.0

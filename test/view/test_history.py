@@ -244,3 +244,26 @@ def test_requests_that_are_none(text: str) -> None:
     """Whatever a page sends, nothing but InputError comes out."""
     with pytest.raises(InputError):
         parse_wanted(text)
+
+
+@pytest.mark.parametrize(
+    ('field', 'value', 'told'),
+    [
+        ('period', np.inf, 'period inf s'),
+        ('period', np.nan, 'period nan s'),
+        ('period', 1e-300, 'period 1e-300 s'),
+        ('period', 0.0, 'period 0 s'),
+        ('index', 2**63, 'running index'),
+    ],
+)
+def test_a_block_without_a_place_in_time_is_refused(field: str, value: float, told: str) -> None:
+    """It says so once; what is shown stays, and the next block goes on."""
+    test = intake(2.0)
+    before = frame(test, Wanted())
+    bad = block(2000, 50)
+    setattr(bad, field, value)
+    with pytest.raises(InputError, match=told):
+        test.take('SampleBlock', bad)
+    assert frame(test, Wanted()) == before
+    test.take('SampleBlock', block(2050, 50))
+    assert decode(frame(test, Wanted()))[0]['newest'] == pytest.approx(2.1)

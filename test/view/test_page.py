@@ -484,6 +484,34 @@ def test_who_is_let_in() -> None:
         server.close()
 
 
+def test_a_frame_that_fails_is_told_and_closes_the_socket(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """An open page would stand still for ever; this one connects anew, and goes on."""
+    live = intake(1.0)
+    server = PageServer(live, 0)
+    own = server.url.rstrip('/')
+
+    async def look() -> None:
+        async with aiohttp.ClientSession() as session:
+            async with session.ws_connect(own + '/socket', origin=own) as socket:
+                assert (await socket.receive(timeout=5.0)).type == aiohttp.WSMsgType.BINARY
+                with monkeypatch.context() as broken:
+                    broken.setattr(live.history, 'curves', None)
+                    feed(live, 1000, 50)
+                    while (await socket.receive(timeout=5.0)).type == aiohttp.WSMsgType.BINARY:
+                        pass
+                assert socket.close_code == 1011
+            async with session.ws_connect(own + '/socket', origin=own) as socket:
+                assert (await socket.receive(timeout=5.0)).type == aiohttp.WSMsgType.BINARY
+
+    try:
+        asyncio.run(look())
+    finally:
+        server.close()
+    assert capfd.readouterr().err.count('a frame could not be made') == 1
+
+
 @browser
 @pytest.mark.slow
 @pytest.mark.timeout(2 * 60 * MINUTES + 300)
