@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
 from actuator_glue.api.stability import StabilityResult
@@ -85,6 +87,7 @@ def compare_compensators(
     frequencies: Sequence[float] | float = FREQUENCIES,
     criteria: Mapping[str, float] | None = None,
     seed: int | None = 1,
+    progress: Callable[[float], object] | bool | None = None,
 ) -> Comparison:
     """Return a hybrid test with every compensator, and which of them to use.
 
@@ -96,24 +99,28 @@ def compare_compensators(
         frequencies: where the actuator's delay and amplitude are told [Hz].
         criteria: peaks that must not be exceeded, as `rths` takes them.
         seed: of specimens and noise, the same for each; None for a fresh one.
+        progress: called with the share that is done, in [0, 1]; True for a bar, False for none;
+            None for a bar in a notebook only. A callback that fails is not called again.
 
     Raises:
         InputError: as `rths`.
     """
     seed, calibration = seed_given(seed), calibration_given(calibration)
-    found: dict[str, StabilityResult] = {
-        kind: rths(
-            partition,
-            calibration,
-            compensator=kind,
-            ground_motion=ground_motion,
-            draws=draws,
-            frequencies=frequencies,
-            criteria=criteria,
-            seed=seed,
-        )
-        for kind in KINDS
-    }
+    found: dict[str, StabilityResult] = {}
+    told = harmless(progress) if callable(progress) else None
+    with shown('compensators', 1.0, False if callable(progress) else progress) as bar:
+        for kind in KINDS:
+            found[kind] = rths(
+                partition,
+                calibration,
+                compensator=kind,
+                ground_motion=ground_motion,
+                draws=draws,
+                frequencies=frequencies,
+                criteria=criteria,
+                seed=seed,
+            )
+            (told or bar)(len(found) / len(KINDS))
 
     def rank(kind: str) -> tuple[float, float]:
         worst = _worst(found[kind])

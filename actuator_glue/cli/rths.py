@@ -10,7 +10,7 @@ import argparse
 from typing import Any
 
 from actuator_glue.arguments import Output, number
-from actuator_glue.cli._output import add_json, beside, note, say, table
+from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
@@ -120,9 +120,10 @@ def run(args: argparse.Namespace) -> int:
     }
     compared = None
     if args.compensator == 'best':
-        compared = compare_compensators(
-            args.partition, calibration, motion or 'artificial', **options
-        )
+        with progress('comparing compensators', 1.0) as done:
+            compared = compare_compensators(
+                args.partition, calibration, motion or 'artificial', progress=done, **options
+            )
         found = compared.found[compared.best]
     else:
         found = rths(
