@@ -9,6 +9,7 @@ import numpy as np
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
 from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
+from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.predictive import ResidualModel
@@ -96,6 +97,20 @@ class CalibrationData:
         """Draws of all chains, shape (m, p), SI units."""
         return self.draws.reshape(-1, self.draws.shape[2])
 
+    def check(self) -> None:
+        """Refuse arrays that are no posterior of the parameters.
+
+        Raises:
+            InputError: an array that is empty, of the wrong shape, no numbers, NaN or infinite.
+        """
+        count = len(self.parameters)
+        steps = self.draws.shape[:2]
+        _check_array('draws', self.draws, (*steps, count), 3)
+        _check_array('log_density', self.log_density, steps, 2, infinite=True)
+        _check_array('best', self.best, (count,), 1)
+        for sketch in filter(np.size, self.sketches):  # a short record has none
+            _check_array('sketches', sketch, sketch.shape, 2)
+
     def carried(self) -> Carried:
         """Return the draws as a prior for later tests of the same actuator."""
         from actuator_glue.inference.mixture_density import components
@@ -104,3 +119,17 @@ class CalibrationData:
         positive = (found.draws > 0.0).all(axis=0)
         logs = np.where(positive, np.log(np.where(positive, found.draws, 1.0)), found.draws)
         return replace(found, components=components(logs, COMPONENTS))
+
+
+def _check_array(
+    name: str, values: Array, shape: tuple[int, ...], axes: int, *, infinite: bool = False
+) -> None:
+    """Refuse an array of another shape, an empty one, and what holds more than numbers."""
+    if values.ndim != axes or values.shape != shape or not values.size:
+        raise InputError(
+            f'array {name} has the shape {values.shape}, which does not go with the parameters'
+        )
+    if values.dtype.kind not in 'fiu':
+        raise InputError(f'array {name} holds no numbers')
+    if np.isnan(values).any() or not (infinite or np.isfinite(values).all()):
+        raise InputError(f'array {name} holds {"NaN" if infinite else "NaN or infinite numbers"}')

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.posterior_model import PosteriorModel
+from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.motion import speaking, spoken
@@ -154,6 +155,24 @@ class Calibration(PosteriorModel, CalibrationData):
             names=np.array(self.names),
             units=np.array([p.unit for p in self.parameters.values()]),
         )
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Return what `save` wrote.
+
+        Raises:
+            InputError: the file cannot be read, holds something else, or arrays that are no
+                posterior: of another shape than its parameters, empty, NaN.
+        """
+        found = super(Calibration, cls).load(path)
+        try:
+            found.check()
+        except InputError as error:
+            raise InputError(
+                f'{path}: {error}; the file is damaged or was written by something else: '
+                'calibrate again, and save'
+            ) from None
+        return found
 
     def plot(self) -> Figure:
         """Return a figure of every parameter's distribution and every pair of them."""

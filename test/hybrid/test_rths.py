@@ -1,6 +1,7 @@
 """From a posterior to P(unstable): known loops, the public API, the command line."""
 
 import json
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from scipy import signal, stats
 
 import actuator_glue as ag
+from actuator_glue.api import store
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.cli.main import main
 from actuator_glue.hybrid.stability import share
@@ -236,3 +238,48 @@ def test_the_command_line_decides(tmp_path: Path, capsys: pytest.CaptureFixture[
             assert found['go'] == (code == 0) and (('NO-GO' in said) == (code == 1))
         assert f'P(unstable) = {found["p_unstable"]["value"]:.4g}' in said
     assert main(['rths', 'sdof', '--posterior', str(path), '--limit', '2']) == 2
+
+
+def test_comparing_compensators_shows_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After each of them; on the command line, too."""
+    from actuator_glue.api import compensation
+    from actuator_glue.cli import rths as command
+
+    found = ag.rths('sdof', posterior(), draws=10)
+    monkeypatch.setattr(compensation, 'rths', lambda *_, **__: found)
+    shares: list[float] = []
+    ag.compare_compensators('sdof', posterior(), progress=shares.append)
+    assert shares == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    shown: list[float] = []
+    bar = nullcontext(shown.append)
+    monkeypatch.setattr(command, 'progress', lambda title, total: bar)
+    path = str(posterior().save(tmp_path / 'posterior.npz'))
+    main(['rths', 'sdof', '--posterior', path, '--compensator', 'best'])
+    assert shown == shares
+
+
+@pytest.mark.parametrize(
+    ('array', 'value', 'told'),
+    [
+        ('draws', np.full((5, 4, 4), np.nan), 'NaN or infinite'),
+        ('draws', np.empty((0, 4, 4)), r'shape \(0, 4, 4\)'),
+        ('draws', np.ones((5, 4, 3)), r'shape \(5, 4, 3\)'),
+        ('draws', np.ones(4), r'shape \(4,\)'),
+        ('best', np.array([1.0, np.inf, 1.0, 1.0]), 'NaN or infinite'),
+        ('best', np.ones(3), r'shape \(3,\)'),
+        ('log_density', np.ones((2, 4)), r'shape \(2, 4\)'),
+        ('log_density', np.full((250, 4), np.nan), 'NaN'),
+        ('sketches', (np.ones(3),), r'shape \(3,\)'),
+        ('draws', np.full((250, 4, 4), 'x'), 'no numbers'),
+    ],
+)
+def test_a_file_of_broken_arrays_is_refused(
+    tmp_path: Path, array: str, value: object, told: str
+) -> None:
+    """It names the file and the array, instead of an answer from nothing or a fault later on."""
+    broken = replace(posterior(), **{array: value})
+    path = store.save(tmp_path / 'posterior.npz', broken.schema, broken)
+    with pytest.raises(ag.InputError, match=rf'posterior\.npz: array {array}.* {told}'):
+        ag.Calibration.load(path)
