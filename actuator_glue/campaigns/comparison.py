@@ -18,6 +18,7 @@ from actuator_glue.records import Array
 
 # p-value of all parameters together below which two sides are of different machines.
 DIFFERENT = 0.01
+_TOLD = 5  # shared days that an error names
 HEADER = ('parameter', 'B over A', '2.5 %', '97.5 %', 'scatter of days', 'p')
 
 
@@ -83,12 +84,14 @@ def compare(folder: Path | str, a: str, b: str, *, actuator: str | None = None) 
         actuator: whose; None where the campaign has one, or the test's name says it.
 
     Raises:
-        InputError: no such test, no day of test there, or sides of two actuators.
+        InputError: no such test, no day of test there, sides of two actuators, or sides that share
+            tests.
     """
     if actuator is None:
         actuator = _named(folder, (a, b))
     found = history(folder, actuator)
     sides = [_side(found, text) for text in (a, b)]
+    _apart(found, (a, b), sides)
     means, covariances = zip(*(_mean(found, side) for side in sides), strict=True)
     step = means[1] - means[0]
     spread = np.sqrt(np.diag(covariances[0] + covariances[1]))
@@ -142,6 +145,22 @@ def _side(found: ActuatorHistory, text: str) -> list[int]:
             f'from {series.days[0]} to {series.days[-1]}'
         )
     return side
+
+
+def _apart(found: ActuatorHistory, texts: Sequence[str], sides: Sequence[list[int]]) -> None:
+    """Check that no day is on both sides: its scatter would count as two independent ones.
+
+    Raises:
+        InputError: one is.
+    """
+    shared = [found.series.days[i] for i in sides[0] if i in set(sides[1])]
+    if shared:
+        days = ', '.join(shared[:_TOLD])
+        more = f' and {len(shared) - _TOLD} more' if len(shared) > _TOLD else ''
+        raise InputError(
+            f'{texts[0]} and {texts[1]} share {days}{more}: all tests of a day are one estimate, '
+            'which can be on one side only; choose sides without a common day'
+        )
 
 
 def _mean(found: ActuatorHistory, side: list[int]) -> tuple[Array, Array]:

@@ -179,6 +179,24 @@ def test_sides_of_a_repair_differ(repaired: Path, capsys: pytest.CaptureFixture[
         compare(repaired, '1999-01-01', days[0])
 
 
+def test_sides_that_share_a_day_are_refused(
+    repaired: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same day, stretches that overlap, a test within the other side; neighbours are fine."""
+    days = history(repaired, 'north').series.days
+    with pytest.raises(ag.InputError, match=f'share {days[0]}: '):
+        compare(repaired, days[0], days[0])
+    with pytest.raises(ag.InputError, match=f'share {days[2]}, {days[3]}: '):
+        compare(repaired, f'{days[0]}:{days[3]}', f'{days[2]}:{days[9]}')
+    with pytest.raises(ag.InputError, match=f'share {days[1]}: '):
+        compare(repaired, f'north/{days[1]}', f'{days[0]}:{days[3]}')
+    with pytest.raises(ag.InputError, match=f'{days[4]} and 55 more: '):
+        compare(repaired, f'{days[0]}:{days[59]}', f'{days[0]}:{days[59]}')
+    assert main(['compare', str(repaired), days[0], days[0], '--actuator', 'north']) == 2
+    assert f'share {days[0]}' in capsys.readouterr().err
+    assert compare(repaired, f'{days[0]}:{days[3]}', f'{days[4]}:{days[9]}').a == days[:4]
+
+
 @pytest.mark.usefixtures('undrawn')
 def test_a_page_and_a_prior_for_each_actuator(
     repaired: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
