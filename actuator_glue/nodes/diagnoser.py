@@ -21,7 +21,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
 from actuator_glue.nodes.explained import Explained
 from actuator_glue.nodes.health import ERROR
-from actuator_glue.nodes.latched import Newest
+from actuator_glue.nodes.latched import Latched, newest, of_one_numbering
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.now import now_ns
 from actuator_glue.nodes.working import WorkingNode
@@ -84,12 +84,13 @@ class DiagnoserNode(WorkingNode):
 
     def listen(self) -> None:
         """Subscribe: set-ups first, then the samples that they are for."""
-        self._setups = Newest(
+        self._setups = Latched(
             self,
             topics.TEST_SETUP,
             lambda message: self._tell(self.collector.setup(from_message(message))),
+            of_one_numbering,
         )
-        self._estimators = Newest(self, topics.ESTIMATOR_SETUP, self._estimator)
+        self._estimators = Latched(self, topics.ESTIMATOR_SETUP, self._estimator, newest)
         self.subscribe(topics.BAND, self._band)
         self.subscribe(topics.POSTERIOR, self._posterior)
         self.subscribe(topics.DRAWS, self._draws)

@@ -18,7 +18,7 @@ from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.nodes import configuration, own_effects, spin, topics
 from actuator_glue.nodes.estimator_worker import compute, compute_beside, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
-from actuator_glue.nodes.latched import Newest
+from actuator_glue.nodes.latched import Latched, of_one_numbering
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.now import now_ns
 from actuator_glue.nodes.silence import Silence
@@ -104,7 +104,7 @@ class EstimatorNode(WorkingNode):
     def listen(self) -> None:
         """Subscribe: set-ups first, then the samples that they are for."""
         self.silence = Silence(time.monotonic())
-        self._setups = Newest(self, topics.TEST_SETUP, self._setup)
+        self._setups = Latched(self, topics.TEST_SETUP, self._setup, of_one_numbering)
         self.subscribe(topics.PREVIEW, self._preview)
         self.subscribe(topics.SAMPLES, self._block)
 
