@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
@@ -119,7 +119,8 @@ def requested(request: Any) -> Proposal:
     """Return the structures that a SetModel request names.
 
     Raises:
-        InputError: unknown effects or parameters, lists that do not belong together.
+        InputError: unknown effects or parameters, one that is named twice, lists that do not
+            belong together.
     """
     if not request.structures:
         return Proposal.of(_model(request))
@@ -139,6 +140,7 @@ def _model(named: Any) -> ModelChoice:
             f'{len(names)} parameter names, {len(lower)} lower, {len(upper)} upper bounds and '
             f'{len(start)} starting values do not belong together'
         )
+    _once(names, 'parameter_names')
     bounds = {n: (lo, up) for n, lo, up in zip(names, lower, upper, strict=True)}
     places = dict(zip(names, start, strict=True)) if start else None
     return choose_model(tuple(named.effects), bounds, places)
@@ -149,8 +151,20 @@ def _known(structure: Any) -> Known | None:
     names = tuple(structure.known_names)
     if not names:
         return None
+    _once(names, 'known_names')
     draws = np.asarray(structure.known, np.float64)
     if draws.size % len(names):
         raise InputError(f'{draws.size} numbers are no draws of {len(names)} parameters')
     carried = Carried(names, draws.reshape(-1, len(names)))
     return Known(carried, int(structure.known_middle), int(structure.known_last))
+
+
+def _once(names: Sequence[str], where: str) -> None:
+    """Check that no parameter is named twice: which of its numbers counts would be a guess.
+
+    Raises:
+        InputError: one is.
+    """
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f'{where} holds {", ".join(twice)} more than once; name each once')
