@@ -20,7 +20,12 @@ from actuator_glue.online.forecast import WindowPrediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Preview, structure_effects, structure_name
+from actuator_glue.online.stream import (
+    Preview,
+    structure_effects,
+    structure_name,
+    structure_weights,
+)
 from actuator_glue.online.structures import Proposal
 from actuator_glue.online.window_posterior import ARCHIVE, spread
 from actuator_glue.records import Array
@@ -228,12 +233,13 @@ def draws(result: WindowResult) -> tuple[Head, Fields]:
 
 
 def weights(message: Any) -> Weights:
-    """Return effects and weight of each structure of a PosteriorMoments, the likeliest first."""
-    names = list(getattr(message, 'structures', ())) or [structure_name(message.effects)]
-    found = list(getattr(message, 'weights', ())) or [1.0]
+    """Return effects and weight of each structure of a PosteriorMoments, the likeliest first.
+
+    Raises:
+        InputError: not as many weights as structures.
+    """
     return tuple(
-        (frozenset(structure_effects(name)), float(weight))
-        for name, weight in zip(names, found, strict=True)
+        (frozenset(structure_effects(name)), weight) for name, weight in structure_weights(message)
     )
 
 

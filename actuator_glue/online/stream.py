@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
+from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
 
 _PLAIN, _BESIDE = 'Eq. (2)', ' + '
@@ -127,6 +128,22 @@ def structure_name(effects: Sequence[str]) -> str:
 def structure_effects(name: str) -> tuple[str, ...]:
     """Return the effects in a structure's name."""
     return () if name == _PLAIN else tuple(name.split(_BESIDE))
+
+
+def structure_weights(posterior: Any) -> list[tuple[str, float]]:
+    """Return name and weight of each structure of a PosteriorMoments; older ones know of one.
+
+    Raises:
+        InputError: not as many weights as structures.
+    """
+    names = list(getattr(posterior, 'structures', ())) or [structure_name(posterior.effects)]
+    shares = list(getattr(posterior, 'weights', ())) or [1.0]
+    if len(names) != len(shares):
+        raise InputError(
+            f'posterior of window {posterior.window}: {len(shares)} weights of {len(names)} '
+            'structures; whoever publishes it must give each structure its weight'
+        )
+    return [(str(name), float(share)) for name, share in zip(names, shares, strict=True)]
 
 
 Event: TypeAlias = Restarted | Rejected | Dropped | Failed | Contradicted | Reweighed

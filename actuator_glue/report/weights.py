@@ -11,7 +11,7 @@ from typing import Any
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize, full_name
-from actuator_glue.online.stream import structure_name
+from actuator_glue.online.stream import structure_weights
 
 TITLE = 'Explanations and their weights over time, by the ends of windows'
 HEADER = ('from [s]', 'to [s]', 'weights, at first -> at last')
@@ -66,10 +66,12 @@ def spells(course: Sequence[tuple[float, Mapping[str, float]]]) -> list[Spell]:
 
 
 def named(posterior: Any) -> dict[str, float]:
-    """Return name and weight of each structure of a PosteriorMoments; older ones know of one."""
-    names = list(getattr(posterior, 'structures', ())) or [structure_name(posterior.effects)]
-    shares = list(getattr(posterior, 'weights', ())) or [1.0]
-    return {str(name): float(share) for name, share in zip(names, shares, strict=True)}
+    """Return name and weight of each structure of a PosteriorMoments; older ones know of one.
+
+    Raises:
+        InputError: not as many weights as structures.
+    """
+    return dict(structure_weights(posterior))
 
 
 def of_bag(path: Path | str) -> dict[str, list[tuple[float, dict[str, float]]]]:

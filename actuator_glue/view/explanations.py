@@ -57,6 +57,9 @@ def explanations(posterior: Any) -> list[Explanation]:
     """Return the structures of a PosteriorMoments, the likeliest first.
 
     Older messages hold one structure only, and no parameters of each structure by itself.
+
+    Raises:
+        InputError: not as many weights as structures.
     """
     weights = named(posterior)
     sizes = list(getattr(posterior, 'structure_sizes', ())) or [0] * len(weights)

@@ -1,9 +1,12 @@
 """Explanations and their weights over time, as a table."""
 
 from pathlib import Path
+from types import SimpleNamespace as Message
 
 import pytest
 
+from actuator_glue.errors import InputError
+from actuator_glue.online import conversion
 from actuator_glue.report import weights
 from actuator_glue.report.weights import Spell, spells
 
@@ -49,3 +52,14 @@ def test_weights_move_over_the_reference_session() -> None:
     (course,) = weights.of_bag(SESSION).values()
     told = [s.told() for s in spells(course)]
     assert told == ['Eq. (2) 100 %', 'backlash 97 %, Eq. (2) 3 %', 'backlash 100 %']
+
+
+@pytest.mark.parametrize('shares', [[0.6], [0.5, 0.3, 0.2]])
+def test_weights_that_do_not_belong_to_the_structures_are_refused(shares: list[float]) -> None:
+    """Whose weight it is would be a guess; one structure of old is not asked for any."""
+    message = Message(structures=['Eq. (2)', 'backlash'], weights=shares, window=7)
+    with pytest.raises(InputError, match=f'window 7: {len(shares)} weights of 2 structures'):
+        weights.named(message)
+    with pytest.raises(InputError, match='weights of 2 structures'):
+        conversion.weights(message)
+    assert weights.named(Message(effects=['play'])) == {'play': 1.0}

@@ -5,7 +5,10 @@ from types import SimpleNamespace as Message
 import pytest
 from stream import diagnosis, posterior
 
+from actuator_glue.errors import InputError
 from actuator_glue.view.explanations import diagnosed, explanations
+from actuator_glue.view.history import History
+from actuator_glue.view.intake import Intake
 
 
 def test_tied_names_have_probabilities_and_sizes_if_true() -> None:
@@ -47,3 +50,15 @@ def test_structures_are_the_likeliest_first_with_their_own_parameters() -> None:
     assert second.parameters == ()
     bare = Message(effects=['play'])
     assert [one.name for one in explanations(bare)] == ['play']
+
+
+def test_a_posterior_without_all_its_weights_is_refused_and_those_after_it_are_shown() -> None:
+    """One clear reason; nothing of it is on the page, and the page goes on."""
+    intake = Intake(History(100), 'live', live=True)
+    bad = posterior(3, 100.0, Eq2=0.2, backlash=0.8)
+    bad.weights = [1.0]
+    with pytest.raises(InputError, match='window 3: 1 weights of 2 structures'):
+        intake.take('PosteriorMoments', bad)
+    intake.take('PosteriorMoments', posterior(4, 100.0, Eq2=0.2, backlash=0.8))
+    assert [one.name for one in explanations(posterior(5, Eq2=1.0))] == ['Eq. (2)']
+    assert 'backlash' in intake._explained
