@@ -29,6 +29,17 @@ MAX_STIFFNESS = 1e12  # N/m
 LONGEST_STROKE = 2.0  # m
 SLOWEST_RATE = 5.0  # Hz
 FASTEST_RATE = 100e3  # Hz
+# Periods closer than this are one [1]: the last digits of a clock, or of a rate turned over.
+_ONE_PERIOD = 1e-4
+
+
+def same_period(one: float, other: float) -> bool:
+    """Whether two sample periods [s], or two rates [Hz], are one; NaN is none.
+
+    Everything that compares periods asks here, so that what one part of the library takes for a
+    single stream no other part takes for many.
+    """
+    return abs(one - other) <= _ONE_PERIOD * min(abs(one), abs(other))
 
 
 def _kept(values: ArrayLike) -> TypeGuard[Array]:

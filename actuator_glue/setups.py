@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.motion import METRES
-from actuator_glue.records import Hold, check_motion, check_stiffness
+from actuator_glue.records import Hold, check_motion, check_stiffness, same_period
 
 MAX_INDEX = 2**62
 # Stiffness in a message that leaves it unfilled [N/m]: a message's default can be any number but
@@ -60,13 +60,12 @@ class StreamSetup:
 
     def same_test(self, other: StreamSetup) -> bool:
         """Whether samples under both set-ups may be fitted together."""
-        return (self.stiffness, self.period, self.actuator, self.hold, self.motion) == (
-            other.stiffness,
-            other.period,
-            other.actuator,
-            other.hold,
-            other.motion,
-        )
+        return same_period(self.period, other.period) and (
+            self.stiffness,
+            self.actuator,
+            self.hold,
+            self.motion,
+        ) == (other.stiffness, other.actuator, other.hold, other.motion)
 
 
 def known_stiffness(value: float) -> float | None:

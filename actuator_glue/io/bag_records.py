@@ -31,7 +31,7 @@ from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
 from actuator_glue.motion import METRES
-from actuator_glue.records import Record
+from actuator_glue.records import Record, same_period
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import Setups, StreamSetup
 
@@ -89,7 +89,7 @@ class _Segment:
         """Whether a block belongs to the same test: it goes on under the same set-up."""
         return (
             block.index == self.next_index
-            and block.period == self.first.period
+            and same_period(block.period, self.first.period)
             and (block.force is None) == (self.first.force is None)
             and _test(setup) == _test(self.setup)
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.online.stream import Preview
-from actuator_glue.records import MAX_DISPLACEMENT, Array
+from actuator_glue.records import MAX_DISPLACEMENT, Array, same_period
 
 
 class Ahead:
@@ -31,7 +31,8 @@ class Ahead:
         if not np.abs(command).max() <= MAX_DISPLACEMENT:
             raise InputError(f'{where}: NaN, or a displacement beyond {MAX_DISPLACEMENT:g} m')
         stop = self._start + len(self._command)
-        if preview.period == self._period and self._start <= preview.index <= stop:
+        follows = self._start <= preview.index <= stop
+        if follows and same_period(preview.period, self._period):
             command = np.concatenate([self._command[: preview.index - self._start], command])
             self._command = command[-self._limit :]
             self._start += len(command) - len(self._command)
@@ -46,7 +47,7 @@ class Ahead:
 
     def between(self, start: int, stop: int, period: float) -> Array | None:
         """Return the commands of samples start:stop; None where not all of them are known."""
-        if self._period == 0.0 or abs(period / self._period - 1.0) > 1e-4:
+        if not same_period(period, self._period):
             return None
         if not self._start <= start <= stop <= self._start + len(self._command):
             return None

@@ -16,7 +16,7 @@ from actuator_glue.online.stream import (
     Restarted,
     Window,
 )
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Record, same_period
 from actuator_glue.sample_block import Block, check_block
 from actuator_glue.setups import Setups, StreamSetup
 
@@ -158,7 +158,7 @@ class SlidingWindows:
         """
         for ahead in self._setups.ahead(block.index, len(block), self._next):
             setup = ahead or self.current
-            if setup is not None and abs(block.period / setup.period - 1.0) > 1e-4:
+            if setup is not None and not same_period(block.period, setup.period):
                 raise InputError(
                     f'block at sample {block.index}: period {block.period:g} s, but the test '
                     f'set-up says {1.0 / setup.period:g} Hz; publish a set-up with the rate of '
@@ -172,7 +172,7 @@ class SlidingWindows:
             WrongRateError: the stamps of the last seconds show another rate.
         """
         rate = 1.0 / block.period
-        if abs(rate / self._rate - 1.0) > 1e-4:
+        if not same_period(rate, self._rate):
             self._rate = rate
             # Decided before the first window, if that is long enough for a clock's precision.
             seconds = max(LEAST_SECONDS, min(0.75 * self.settings.window, _RATE_SECONDS))
@@ -222,7 +222,7 @@ class SlidingWindows:
             return []
         if before is None or setup.actuator != before.actuator:
             self._epoch += 1
-        if before is None or setup.period != before.period or self._tail is None:
+        if before is None or self._tail is None or not same_period(setup.period, before.period):
             self._window = max(2, round(self.settings.window / setup.period))
             self._hop = max(1, round(self.settings.hop / setup.period))
             self._tail = Tail(max(self._window, 2 * self._hop))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Record, same_period
 from actuator_glue.streams.layout import Layout
 from actuator_glue.streams.transports import Sender
 
@@ -50,7 +50,7 @@ def check(record: Record, layout: Layout) -> None:
             f'{layout.source or "a packet without a layout"} carries {layout.motion}; give a '
             f'layout in which command and measured have `unit: {record.motion}`'
         )
-    if layout.rate is not None and abs(record.rate / layout.rate - 1.0) > 1e-6:
+    if layout.rate is not None and not same_period(record.rate, layout.rate):
         raise InputError(
             f'{record.source}: {record.rate:g} Hz, but {layout.source} says {layout.rate:g} Hz'
         )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.records import same_period
 from actuator_glue.view.logbook import Logbook
 from actuator_glue.view.trends import Trends
 
@@ -83,7 +84,7 @@ class History:
 
         A force that there is none of may be empty.
         """
-        if period != self.period:
+        if not same_period(period, self.period):
             self._restart(index, period, told=place is None)
         elif index < self._next or index - self._next > self.capacity:
             self._shift = self.measured_to - index  # a new stream, or one long interrupted

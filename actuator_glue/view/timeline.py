@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.records import same_period
+
 LONGEST_GAP = 1 << 22  # samples that a bag lacks and the page leaves empty, an hour at 1 kHz
 _CATCH_UP = 60.0  # s, within which a recorder that stood still is on time again
 
@@ -46,7 +48,7 @@ class Timeline:
             period: between them [s].
             received: when the recorder took the block [ns].
         """
-        if period != self.period:
+        if not same_period(period, self.period):
             self._most, self.passed = self.capacity, self.samples
             self.period, self.places, self._shift, self._next = period, 0, -index, index
             for column in (self._stops, self._times, self._streams):

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -303,3 +304,18 @@ def test_messages_out_of_the_order_of_their_times_are_put_in_order(
     assert np.array_equal(first.command, record.command[:2000])
     assert np.array_equal(second.command, record.command[2000:])
     assert (first.stiffness, second.stiffness) == (1e5, 2e5)
+
+
+def test_a_period_that_differs_in_its_last_digits_is_one_test(
+    tmp_path: Path, record: Record
+) -> None:
+    """A driver that measures its clock writes another period into each block."""
+    rng = np.random.default_rng(1)
+    with open_bag(tmp_path / 'bag') as writer:
+        for start in range(0, 500, 50):
+            block: Any = samples(record, start, start + 50)
+            block.period *= 1.0 + 1e-9 * rng.uniform(-1.0, 1.0)
+            writer.write('/samples', block, record.stamp_ns(start + 50))
+    (found,) = read_records(tmp_path / 'bag')
+    assert len(found) == 500 and found.command.tobytes() == record.command.tobytes()
+    assert found.period == pytest.approx(record.period, rel=1e-8)

@@ -89,6 +89,7 @@ def test_waveforms_of_tdms_are_aligned_by_their_starts(
     [
         (waveform(offset=0.0103), 'no whole number of samples'),
         (waveform(period=2e-3), 'measured_mm one every 0.002 s'),
+        (waveform(period=1.00009e-3), 'measured_mm one every 0.00100009 s'),
         (waveform(offset=0.5), 'command_mm ends before another channel begins'),
         ({}, 'measured_mm has no start of its own'),
     ],
@@ -105,6 +106,17 @@ def test_waveforms_of_tdms_without_common_times_are_refused(
     )
     with pytest.raises(InputError, match=told):
         read(path)
+
+
+def test_waveforms_of_tdms_whose_increments_differ_in_their_last_digits(tmp_path: Path) -> None:
+    """Increments that were divided by another number are one clock, asked for or not."""
+    path = write_tdms(
+        tmp_path / 'a.tdms',
+        ('command_mm', COMMAND, waveform()),
+        ('measured_mm', MEASURED, waveform(period=1e-3 * (1.0 + 1e-9))),
+    )
+    assert np.array_equal(read(path).measured, 1e-3 * MEASURED)
+    assert len(look(path).columns) == 2
 
 
 def test_a_slow_channel_that_nobody_asks_for_is_in_nobodys_way(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Windows: which samples they hold, and what restarts them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Rejected, Restarted
 from actuator_glue.online.windows import SlidingWindows, Tail, WrongRate
+from actuator_glue.records import same_period
 from actuator_glue.sample_block import MAX_BLOCK
 
 SETTINGS = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
@@ -364,3 +367,24 @@ def test_windows_come_again_when_the_rate_is_mended():
     assert isinstance(events[1], WrongRate)
     assert found and found[0].record.first_index >= stop
     assert windows.tally.lost == 0
+
+
+@pytest.mark.parametrize('apart', [1e-9, 3e-5])
+def test_periods_that_are_one_to_any_purpose_are_one(apart):
+    """The last digits of a clock: neither the blocks nor set-ups of one test are others."""
+    rng = np.random.default_rng(2)
+    jittered = [
+        replace(one, period=one.period * (1.0 + apart * rng.uniform(-1.0, 1.0)))
+        for one in cut([50] * 20)
+    ]
+    again = replace(setup(index=500), period=setup().period * (1.0 + apart))
+    found, events, _ = run(jittered, setups=(setup(), again))
+    assert [w.end for w in found] == [w.end for w in run(cut([50] * 20))[0]]
+    assert len(events) == 1 and isinstance(events[0], Restarted)
+
+
+def test_what_is_no_period_is_not_the_same():
+    """NaN, zero, and a share more than the tolerance; rates are compared like periods."""
+    assert same_period(0.005, 0.005 * (1.0 + 9e-5)) and same_period(200.0, 200.01)
+    for one, other in ((0.005, 0.005001), (np.nan, 0.005), (np.nan, np.nan), (0.0, 0.005)):
+        assert not same_period(one, other) and not same_period(other, one)

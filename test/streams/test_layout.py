@@ -87,6 +87,7 @@ def test_a_stream_of_angles_says_so():
     np.testing.assert_allclose([rows.command[0], rows.measured[0]], [0.18, 0.09])
     turned = replace(record(), stiffness=0.0, motion='deg')
     check(turned, found)
+    check(replace(turned, period=turned.period * (1.0 + 1e-5)), found)
     with pytest.raises(InputError, match='is in deg, and a packet without a layout carries m'):
         check(turned, PLAIN)
     with pytest.raises(InputError, match='is in m, and test carries deg'):

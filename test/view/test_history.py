@@ -20,6 +20,7 @@ from stream import (
 from actuator_glue.errors import InputError
 from actuator_glue.view.frames import Frames, Wanted, frame, parse_wanted
 from actuator_glue.view.history import ROWS, History
+from actuator_glue.view.timeline import Timeline
 
 
 def decode(data: bytes) -> tuple[dict, np.ndarray]:
@@ -267,3 +268,18 @@ def test_a_block_without_a_place_in_time_is_refused(field: str, value: float, to
     assert frame(test, Wanted()) == before
     test.take('SampleBlock', block(2050, 50))
     assert decode(frame(test, Wanted()))[0]['newest'] == pytest.approx(2.1)
+
+
+@pytest.mark.parametrize('placed', [False, True])
+def test_a_period_that_differs_in_its_last_digits_keeps_the_history(placed: bool) -> None:
+    """A driver that measures its clock writes another period into each block."""
+    rng = np.random.default_rng(3)
+    history, timeline = History(1000), Timeline()
+    for first in range(0, 400, 50):
+        period = (1.0 + 1e-9 * rng.uniform(-1.0, 1.0)) / RATE
+        place = timeline.add(first, 50, period, round(1e9 * (first + 50) / RATE))
+        rows = {'command': np.ones(50), 'measured': np.ones(50)}
+        history.add_samples(first, period, rows, place if placed else None)
+    assert timeline.places == timeline.capacity == history.measured_to == 400
+    curves = history.curves(0, 400, 400)
+    assert len(curves.times) == 400 and not np.isnan(curves.rows[ROWS.index('measured')]).any()

@@ -13,7 +13,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, check_size, library, reading
 from actuator_glue.io.units import bare, recognise
-from actuator_glue.records import Array
+from actuator_glue.records import Array, same_period
 
 _NAME = 'a LabVIEW TDMS file'
 # Starts that differ by whole samples, up to this share of a sample, are of one clock.
@@ -94,6 +94,12 @@ def _clock(channel: Any) -> _Clock:
     )
 
 
+def _one_clock(one: _Clock, other: _Clock) -> bool:
+    """Whether two waveforms have one period, and come to their end together as well."""
+    apart = abs(one.period - other.period) * min(one.length, other.length)
+    return same_period(one.period, other.period) and apart <= _SAME * one.period
+
+
 def _asked(columns: list[Column], channels: ChannelMap | None) -> list[int]:
     """Return the positions of the columns that a map names, or that are called by their role."""
     if channels is None:
@@ -115,9 +121,8 @@ def _common(
     group = [i for i in asked if i in waveforms]
     if not group:
         # No waveforms are asked for: take those of the most common period.
-        periods = [clocks[i].period for i in waveforms]
-        usual = max(set(periods), key=periods.count, default=0.0)
-        group = [i for i in waveforms if clocks[i].period == usual]
+        groups = [[j for j in waveforms if _one_clock(clocks[i], clocks[j])] for i in waveforms]
+        group = max(groups, key=len, default=[])
     if not group:
         return {}, None, 0
     first = clocks[group[0]]
@@ -134,10 +139,10 @@ def _common(
     faults = []
     for i in group:
         clock = clocks[i]
-        if clock.period != first.period:
+        if not _one_clock(first, clock):
             faults.append(
-                f'{first.name} has a sample every {first.period:g} s and {clock.name} one every '
-                f'{clock.period:g} s'
+                f'{first.name} has a sample every {first.period:.9g} s and {clock.name} one every '
+                f'{clock.period:.9g} s'
             )
             continue
         late = (latest - ahead(clock)) / first.period
