@@ -224,8 +224,8 @@ def test_previews_join_and_stay_bounded():
         assert np.array_equal(known, 1e-3 * np.arange(start + 5, start + 30))
         assert ahead.between(start + 5, start + 31, 0.01) is None
     assert ahead.between(500, 510, 0.01) is None and ahead.between(995, 999, 0.02) is None
-    ahead.take(Preview(1029, 0.01 * (1.0 + 1e-9), np.zeros(2)))
-    assert ahead.between(1000, 1031, 0.01) is not None
+    ahead.take(Preview(1018, 0.01 * (1.0 + 1e-9), np.zeros(4)))
+    assert ahead.between(995, 1022, 0.01) is not None
     for bad in (np.empty(0), np.zeros(101), np.array([np.nan]), np.array([1e6])):
         with pytest.raises(InputError):
             ahead.take(Preview(0, 0.01, bad))
