@@ -105,8 +105,9 @@ class Parameters:
     def __getitem__(self, name: str) -> Any:
         if name in self._secrets:
             return self._secrets[name]
-        value = self._node.get_parameter(name).value
-        return list(value) if isinstance(self._specs[name].default, list) else value
+        value = self._node.get_parameter_or(name).value
+        # To ROS an empty list has no type: what was given as one is not set.
+        return list(value or ()) if isinstance(self._specs[name].default, list) else value
 
     def values(self) -> dict[str, Any]:
         """Return all values by name."""
@@ -131,7 +132,13 @@ class Parameters:
 
     def _check_all(self, values: Mapping[str, Any]) -> None:
         for name, value in values.items():
-            choices = self._specs[name].choices
+            spec = self._specs[name]
+            if value is None or (spec.secret and not isinstance(value, type(spec.default))):
+                raise InputError(
+                    f'parameter {name} = {[] if value is None else value!r} cannot be used: '
+                    f'{spec.descriptor().description}, of type {type(spec.default).__name__}'
+                )
+            choices = spec.choices
             if choices and value not in choices:
                 raise InputError(f'{name} = {value!r} is not one of {", ".join(choices)}')
         self._check(values)

@@ -106,6 +106,10 @@ def test_the_parameter_file_is_the_code_s():
         ('lab_bridge', {'specimen_stiffness': -0.5}, 'is negative'),
         ('replay', {'bag': 'no-such'}, 'neither a bag nor an .mcap'),
         ('recorder', {'bag': '/proc/none'}, 'cannot'),
+        ('estimator', {'levels': []}, 'levels () must lie between 0 and 1'),
+        ('estimator', {'window': []}, 'window = [] cannot be used'),
+        ('actuator_sim', {'undeclared_effect': []}, 'undeclared_effect = [] cannot be used'),
+        ('margin', {'partition': 'sdof', 'compensator': []}, 'compensator []: give three numbers'),
         ('margin', {}, 'no hybrid test is given'),
         ('margin', {'partition': 'nowhere.yaml'}, 'nowhere.yaml'),
         ('margin', {'partition': 'sdof', 'clear_below': 0.5}, 'clear_below'),
@@ -115,6 +119,22 @@ def test_bad_parameters_end_with_2_and_one_clear_message(node, parameters, told,
     process = start(node, **parameters)
     assert process.wait(30) == 2
     assert told in process.text
+    assert 'Traceback' not in process.text
+
+
+@pytest.mark.parametrize(
+    ('node', 'lists'),
+    [
+        ('estimator', ('effects', 'drift_of')),
+        ('recorder', ('topics',)),
+        ('lab_bridge', ('allow',)),
+    ],
+)
+def test_an_empty_list_is_an_empty_list(node, lists, start, probe, tmp_path):
+    """ROS hands it over without a type; nodes take it as they take their default."""
+    process = start(node, **needed(node, tmp_path), **{name: [] for name in lists})
+    probe.until(lambda: process.alive and probe.value(node, 'state') == 'active', 60)
+    assert process.end() == 0
     assert 'Traceback' not in process.text
 
 
