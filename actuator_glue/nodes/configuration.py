@@ -75,6 +75,21 @@ def effects(values: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in values['effects'] if name)
 
 
+def tracking_frequencies(values: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return the frequencies at which delay and amplitude are told [Hz].
+
+    Raises:
+        InputError: there is none, or one that is not positive and finite.
+    """
+    found = tuple(float(f) for f in values['tracking_frequencies'])
+    if not found or not all(0.0 < f < math.inf for f in found):
+        raise InputError(
+            f'tracking_frequencies {list(found)} must be positive and finite [Hz]; give at least '
+            'one'
+        )
+    return found
+
+
 def settings(values: Mapping[str, Any]) -> EstimatorSettings:
     """Return the settings among a node's parameters.
 

@@ -66,6 +66,7 @@ class EstimatorNode(WorkingNode):
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse settings that contradict each other."""
         configuration.settings(values)
+        configuration.tracking_frequencies(values)
         own_effects.load(values)
         choose_model(configuration.effects(values))
         configuration.carried(values)
@@ -78,7 +79,7 @@ class EstimatorNode(WorkingNode):
         self.employ(warm_up)
         self._beside: Worker | None = None
         self._out = {topic: self.publisher(topic) for topic in topics.ESTIMATED}
-        self._frequencies = tuple(values['tracking_frequencies'])
+        self._frequencies = configuration.tracking_frequencies(values)
         service = self.create_service(SetModel, '~/set_model', self._set_model)
         self.at_cleanup(lambda: self.destroy_service(service))
 

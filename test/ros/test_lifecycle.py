@@ -1,5 +1,6 @@
 """Every node: each transition, each parameter, one clear message for a bad one."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -107,6 +108,9 @@ def test_the_parameter_file_is_the_code_s():
         ('replay', {'bag': 'no-such'}, 'neither a bag nor an .mcap'),
         ('recorder', {'bag': '/proc/none'}, 'cannot'),
         ('estimator', {'levels': []}, 'levels () must lie between 0 and 1'),
+        ('estimator', {'tracking_frequencies': [-1.0, math.nan]}, 'must be positive and finite'),
+        ('estimator', {'tracking_frequencies': [5.0, math.inf]}, 'must be positive and finite'),
+        ('estimator', {'tracking_frequencies': []}, 'give at least one'),
         ('estimator', {'window': []}, 'window = [] cannot be used'),
         ('actuator_sim', {'undeclared_effect': []}, 'undeclared_effect = [] cannot be used'),
         ('margin', {'partition': 'sdof', 'compensator': []}, 'compensator []: give three numbers'),
