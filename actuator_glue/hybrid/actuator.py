@@ -65,9 +65,12 @@ def actuator(
         stiffness: specimen stiffness of each draw, (m,) [N/m].
 
     Raises:
-        InputError: draws without an Eq. (2a).
+        InputError: draws without an Eq. (2a), or without a parameter of the model.
     """
     structure = Structure(effects)
+    missing = [name for name in structure.names if name not in names]
+    if missing:
+        raise InputError(f'draws of {", ".join(names)} are none of {", ".join(missing)}, too')
     values = structure.values(table_of(draws, names, structure))
     oil = values['alpha_2'] + stiffness
     if not (oil > 0.0).all():

@@ -16,6 +16,8 @@ from actuator_glue.hybrid.partition import Partition
 from actuator_glue.records import Array
 
 _LIMITS = (0.025, 0.5, 0.975)
+_UNUSABLE = 'draws so large or so small that the loop has no roots to compute'
+_SKIPPED = 'these draws are not used: look at who publishes them'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,13 +103,26 @@ class MarginWatch:
         """Return what draws (m, p) say; `effective` is how many independent ones they are worth.
 
         Raises:
-            InputError: draws that no loop can be made of.
+            InputError: draws that no loop can be made of, or of which nobody knows what they are
+                worth; the warning stays as it was.
         """
+        _check(draws, names, effective)
+        try:
+            return self._taken(draws, names, effects, effective)
+        except np.linalg.LinAlgError as error:
+            raise InputError(f'{_UNUSABLE} ({error}); {_SKIPPED}') from error
+
+    def _taken(
+        self, draws: Array, names: Sequence[str], effects: Sequence[str], effective: float
+    ) -> Watched:
         rng = np.random.default_rng(self._seed)
         specimen = self.partition.specimen.drawn(rng, len(draws))
         loop = Loop.of(self.partition, draws, names, effects, specimen)
         period, chosen = self.partition.period, self._compensator
         growth = sampled.growth(loop.numerical, loop.plants, chosen.coefficients, period)
+        if np.isnan(growth).any():
+            # NaN is not above zero: such a draw would count as stable.
+            raise InputError(f'{_UNUSABLE}; {_SKIPPED}')
         open_loop = stability.loops(self.partition, specimen, loop.actuators.system, chosen)
         delay = loop.actuators.delay + self.partition.computation_delay
         margin = stability.signed_margin(open_loop, period, delay, growth > 0.0)
@@ -130,6 +145,21 @@ class MarginWatch:
             max(sensitive, key=lambda name: abs(sensitive[name]), default=''),
             nonlinear(effects),
             len(draws),
+        )
+
+
+def _check(draws: Array, names: Sequence[str], effective: float) -> None:
+    bad = ~np.isfinite(draws)
+    if bad.any():
+        row, column = (int(at) for at in np.argwhere(bad)[0])
+        raise InputError(
+            f'{int(bad.any(axis=1).sum())} of {len(draws)} draws are NaN or infinite, the first '
+            f'in {names[column]} of draw {row}; {_SKIPPED}'
+        )
+    if np.isnan(effective):
+        raise InputError(
+            f'ess_min of {len(draws)} draws is NaN: without it P(unstable) has no interval; '
+            f'{_SKIPPED}'
         )
 
 

@@ -68,3 +68,45 @@ def test_what_cannot_be_watched(wrong: dict[str, object]) -> None:
     """One error."""
     with pytest.raises(ag.InputError):
         MarginWatch(partition(), **wrong)
+
+
+@pytest.mark.parametrize(
+    ('value', 'names', 'effective', 'told'),
+    [
+        (
+            np.nan,
+            NAMES,
+            100.0,
+            '1 of 100 draws are NaN or infinite, the first in alpha_2 of draw 7',
+        ),
+        (
+            np.inf,
+            NAMES,
+            100.0,
+            '1 of 100 draws are NaN or infinite, the first in alpha_2 of draw 7',
+        ),
+        (THETA[2], NAMES, np.nan, 'ess_min of 100 draws is NaN'),
+        (THETA[2], (*NAMES[:3], 'other'), 100.0, 'none of alpha_3'),
+    ],
+)
+def test_what_came_and_cannot_be_used_is_said(
+    value: float, names: tuple[str, ...], effective: float, told: str
+) -> None:
+    """One error, and what follows is taken as if it had not come."""
+    watch = MarginWatch(partition(0.12))
+    assert watch.take(draws(6), NAMES, (), 100.0).warning
+    broken = draws(0)
+    broken[7, 2] = value
+    with pytest.raises(ag.InputError, match=told):
+        watch.take(broken, names, (), effective)
+    assert watch.warning
+    assert watch.take(draws(3), NAMES, (), 100.0).p_unstable.value == 0.03
+
+
+@pytest.mark.filterwarnings('ignore:.*encountered in')
+def test_draws_without_a_root_are_not_stable_ones() -> None:
+    """Finite, and beyond what numbers hold: NaN is not above zero, but says nothing either."""
+    broken = draws(0)
+    broken[7] = 1e300
+    with pytest.raises(ag.InputError, match='no roots to compute'):
+        MarginWatch(partition()).take(broken, NAMES, (), 100.0)
