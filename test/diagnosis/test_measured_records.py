@@ -93,9 +93,10 @@ def test_mts_of_another_day_gets_what_is_supported(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not FASTER.is_file(), reason=f'its records are not at {FASTER}')
 def test_a_second_machine_gets_what_is_supported() -> None:
-    """Another controller, a random command: weak integral action helps on a held-out third.
+    """Another controller, a random command: what is added helps on a held-out third.
 
-    A gain, which it passes for, left 7.5 um there, integral action 6.2 um.
+    A gain left 7.5 um there, integral action 6.2 um, a description of both 5.2 um; it comes with the
+    name that is nearest to it.
     """
     data = np.genfromtxt(FASTER, delimiter=',', names=True)
     cut = 2 * len(data) // 3
@@ -105,6 +106,7 @@ def test_a_second_machine_gets_what_is_supported() -> None:
     )
     found = diagnose([fitted], held, jobs=2)
     names = {n for e in found.effects for n in (e.name, *e.alternatives)}
-    assert names & {'gain', 'integral-action'}
+    nearest = [line for line in found.advice if 'the name nearest to' in line]
+    assert names & {'gain', 'integral-action'} or any('integral-action' in n for n in nearest)
     assert found.error.removed_ci[0] > 0.0
-    assert found.error.after < 7.0e-6 < 9.0e-6 < found.error.before
+    assert found.error.after < 6.5e-6 < 9.0e-6 < found.error.before
