@@ -95,8 +95,8 @@ def test_mts_of_another_day_gets_what_is_supported(seed: int) -> None:
 def test_a_second_machine_gets_what_is_supported() -> None:
     """Another controller, a random command: what is added helps on a held-out third.
 
-    A gain left 7.5 um there, integral action 6.2 um, a description of both 5.2 um; it comes with the
-    name that is nearest to it.
+    A gain left 7.5 um there, integral action 6.2 um, a description 5.2 um; it comes with the name
+    that is nearest to it.
     """
     data = np.genfromtxt(FASTER, delimiter=',', names=True)
     cut = 2 * len(data) // 3
