@@ -31,10 +31,10 @@ from actuator_glue.diagnosis.moves.move import (
     unexplained,
 )
 
-# Moves under one hold and one onset. Names come before descriptions, which may imitate them.
+# Moves under one hold and one onset. A description may imitate names and settings.
 WITHIN: Final[Groups] = (
-    (AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),),
     (
+        AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),
         AnswerMove("one record's own setting", described, own_setting.own_setting),
         AnswerMove('learned terms', described, to(learned_terms.described)),
     ),
