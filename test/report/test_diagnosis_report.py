@@ -229,7 +229,7 @@ def test_first_page_says_what_came_out_and_what_to_do() -> None:
 
 def test_chains_that_stand_still_have_no_r_hat_and_a_report_all_the_same() -> None:
     """What cannot be told is null in the JSON."""
-    still = Draws(np.zeros((4, 2)), 'dream', 128).told()
+    still = Draws(np.zeros((4, 2)), 'dream', 128).to_json()
     assert still['rhat'] is None
     assert diagnosis_report._drawn(still) == 'nan effective draws by DREAM(ZS), R-hat nan'
 
