@@ -16,8 +16,8 @@ MAX_INDEX = 2**62
 # Stiffness in a message that leaves it unfilled [N/m]: a message's default can be any number but
 # NaN, and 0 would be a free actuator.
 UNFILLED = -1.0
-# Nobody streams into hundreds of announced set-ups; a publisher gone wild must not fill memory.
-_MOST = 16
+# Nobody streams into a thousand announced set-ups; a publisher gone wild must not fill memory.
+_MOST = 1000
 
 
 @dataclass(frozen=True, slots=True)

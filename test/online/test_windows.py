@@ -285,8 +285,8 @@ def test_announced_set_ups_are_bounded():
     windows.push(block(0, 10))
     for index in range(100, 5100):
         windows.setup(setup(index=index))
-    assert len(windows._setups._announced) <= 16
-    assert len(windows._setups._lately) <= 16
+    assert len(windows._setups._announced) <= 1000
+    assert len(windows._setups._lately) <= 1000
 
 
 @pytest.mark.parametrize(
