@@ -26,6 +26,7 @@ _MOST_EVERY = 10  # samples of which a thinner copy may have kept one
 _UNITS = (1.0, 0.0254)  # m: digits are those of metres (and mm) or of inches
 _NEAR = 0.05  # of the spread: no table is coarser, and most pairs of records end here
 _TIES = 1e-6  # of a step: rounding errors of what is written and read
+_LOOK = 1000  # values that are looked at before all of a channel are
 
 
 def refuse_repeats(records: Sequence[Record], held: Sequence[Record] = ()) -> None:
@@ -67,16 +68,13 @@ def refuse_known(records: Sequence[Record], sketches: Sequence[Array], prior: st
     Raises:
         InputError: the samples of one of them are in a record.
     """
+    known = [one for many in sketches for one in many]
     for i, record in enumerate(records):
-        for stretch in (one for many in sketches for one in many):
-            if any(
-                _same(record.measured, stretch, at) for at in _places(record.measured, stretch)
-            ):
-                raise InputError(
-                    f'{where(record, i + 1)} holds the same samples as a record of which the '
-                    f'prior from {prior} was made, and would count twice; give other records, or '
-                    'no prior'
-                )
+        if any(_same(record.measured, known[n], at) for n, at in _places(record.measured, known)):
+            raise InputError(
+                f'{where(record, i + 1)} holds the same samples as a record of which the prior '
+                f'from {prior} was made, and would count twice; give other records, or no prior'
+            )
 
 
 def _repeated(one: Record, other: Record) -> bool:
@@ -91,11 +89,9 @@ def _repeated(one: Record, other: Record) -> bool:
 
 def _agree(one: Array, other: Array) -> bool:
     """Whether two channels are the same wherever both have samples, at some shift."""
-    return any(
-        _same(one, other, at - part.start)
-        for part in _parts(other)
-        for at in _places(one, other[part])
-    )
+    parts = list(_parts(other))
+    places = _places(one, [other[part] for part in parts])
+    return any(_same(one, other, at - parts[n].start) for n, at in places)
 
 
 def _parts(values: Array) -> Iterator[slice]:
@@ -106,17 +102,20 @@ def _parts(values: Array) -> Iterator[slice]:
         yield slice(start, start + length)
 
 
-def _places(values: Array, stretch: Array) -> Iterator[int]:
-    """Yield where a stretch is nearest to a channel; nothing where it is longer."""
-    if len(stretch) > len(values) or not _changes(stretch) >= _FEWEST:
-        return
-    zero = float(stretch.mean())  # less of the sums cancels
-    values, stretch = values - zero, stretch - zero
+def _places(values: Array, stretches: Sequence[Array]) -> Iterator[tuple[int, int]]:
+    """Yield where each of some stretches is nearest to a channel, with the stretch's number.
+
+    None of those that are longer than the channel, or rest.
+    """
+    zero = float(values.mean())  # less of the sums cancels
+    values = values - zero
     sums = np.cumsum(np.append(0.0, values**2))
-    squares = sums[len(stretch) :] - sums[: -len(stretch)]
-    yield int(
-        np.argmin(squares - 2.0 * scipy.signal.correlate(values, stretch, 'valid', method='fft'))
-    )
+    for n, stretch in enumerate(stretches):
+        size = len(stretch)
+        if size <= len(values) and _changes(stretch) >= _FEWEST:
+            # Overlap-add: a transform of the whole channel would take ten times as long.
+            products = scipy.signal.oaconvolve(values, (stretch - zero)[::-1], 'valid')
+            yield n, int(np.argmin(sums[size:] - sums[:-size] - 2.0 * products))
 
 
 def _same(one: Array, other: Array, shift: int) -> bool:
@@ -149,15 +148,23 @@ def _step(values: Array) -> Array:
     Zero where neither shows.
     """
     least = float(np.diff(np.unique(values)).min())
-    counts = (values - values[0]) / least
-    even = float(np.abs(counts - np.rint(counts)).max()) < 1e-3
+    even = all(_whole((part - values[0]) / least) for part in (values[:_LOOK], values))
     steps = [np.full(len(values), least if even else 0.0)]
     for unit in _UNITS:
         told = np.maximum(np.abs(values) / unit, 1e-300)
-        place = np.floor(np.log10(told * (1.0 + _TIES)))
         for digits in _DIGITS:
-            step = 10.0 ** (place - digits + 1)
-            if float(np.abs(told / step - np.rint(told / step)).max()) < 1e-3:
-                steps.append(unit * step)
+            # Most channels are in no such digits, as the first of their values show.
+            if all(_whole(part / _place(part, digits)) for part in (told[:_LOOK], told)):
+                steps.append(unit * _place(told, digits))
                 break
     return np.asarray(np.max(steps, axis=0))
+
+
+def _place(told: Array, digits: int) -> Array:
+    """Return what one in the last of so many digits of each value is, (n,)."""
+    first = np.floor(np.log10(told * (1.0 + _TIES)))
+    return np.asarray(10.0 ** (first - digits + 1))
+
+
+def _whole(counts: Array) -> bool:
+    return float(np.abs(counts - np.rint(counts)).max()) < 1e-3
