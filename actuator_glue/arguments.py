@@ -63,17 +63,18 @@ def only_with(args: argparse.Namespace, options: str, *needed: str) -> None:
     Raises:
         InputError: one was given, and none of the others.
     """
-    if any(_given(args, name) for name in needed):
+    if any(given(args, name) for name in needed):
         return
     for option in options.split():
-        if _given(args, option):
+        if given(args, option):
             raise InputError(
                 f'{option} does nothing without {" or ".join(needed)}; add that, or take {option} '
                 'out'
             )
 
 
-def _given(args: argparse.Namespace, option: str) -> bool:
+def given(args: argparse.Namespace, option: str) -> bool:
+    """Return whether an option was given, as '--drift'; None, False and [] are what is not."""
     value = getattr(args, option.lstrip('-').replace('-', '_'))
     return value is not None and value is not False and value != []
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
+from io import IOBase
+from os import PathLike
 from typing import TYPE_CHECKING, SupportsFloat, cast
 
 import numpy as np
@@ -49,6 +51,15 @@ def whole(value: object, name: str) -> int:
     if not found.is_integer():
         raise InputError(f'{name} is {_shown(value)}; give a whole number')
     return int(found)
+
+
+def one_thing(value: object) -> bool:
+    """Whether a value is one thing, and not several given together, though it can be iterated.
+
+    A path is not its letters, a table not its columns, a mapping not its keys, an open file not
+    its lines.
+    """
+    return isinstance(value, (str, PathLike, Mapping, IOBase)) or hasattr(value, 'columns')
 
 
 def of_kind(value: object, name: str, kinds: type | tuple[type, ...], wanted: str) -> None:

@@ -27,20 +27,25 @@ def in_notebook() -> bool:
 
 
 @contextmanager
-def shown(title: str, total: float, asked: bool | None) -> Iterator[Callable[[float], None]]:
+def shown(
+    title: str, total: float, asked: Callable[[float], object] | bool | None
+) -> Iterator[Callable[[float], None]]:
     """Show how much is done; yields `done(amount so far)`.
 
     Args:
         title: what is under way.
         total: amount at the end.
-        asked: True for a bar wherever this runs, False for none, None for one in a notebook.
+        asked: True for a bar wherever this runs, False for none, None for one in a notebook; a
+            function is called instead, until it fails.
     """
-    if asked is False or (asked is None and not in_notebook()):
+    if callable(asked):
+        yield harmless(asked)
+    elif asked is False or (asked is None and not in_notebook()):
         yield lambda amount: None
     elif in_notebook():
         line = _Line(title, total)
         try:
-            yield harmless(line) or line
+            yield harmless(line)
         finally:
             line.clear()
     else:

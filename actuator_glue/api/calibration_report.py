@@ -188,7 +188,7 @@ def errors(error: FitError, left: ResidualStructure | None) -> html.Table:
             name = source_name(of.source) or 'a record'
             rows.append([f'... in {name}', f'{1e6 * of.rms_m:.1f}'])
     if left is not None:
-        means = f', in means over {1e3 * left.means_s:.3g} ms' if left.means_s else ''
+        means = left.averaged and f',{left.averaged}'
         rows.append([f'structure in it{means}', f'{1e6 * left.structure_m:.1f}'])
         rows.append([f'noise{means}', f'{1e6 * left.noise_m:.1f}'])
     return html.Table(['', 'rms [um]'], rows, 'Measured displacement less the model.')

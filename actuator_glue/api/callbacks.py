@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import ParamSpec
+from typing import ParamSpec, overload
 
 P = ParamSpec('P')
+
+
+@overload
+def harmless(told: Callable[P, object]) -> Callable[P, None]: ...
+
+
+@overload
+def harmless(told: Callable[P, object] | None) -> Callable[P, None] | None: ...
 
 
 def harmless(told: Callable[P, object] | None) -> Callable[P, None] | None:

@@ -10,7 +10,6 @@ from typing import Any
 from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
-from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
 from actuator_glue.api.stability import StabilityResult
@@ -107,8 +106,7 @@ def compare_compensators(
     """
     seed, calibration = seed_given(seed), calibration_given(calibration)
     found: dict[str, StabilityResult] = {}
-    told = harmless(progress) if callable(progress) else None
-    with shown('compensators', 1.0, False if callable(progress) else progress) as bar:
+    with shown('compensators', 1.0, progress) as done:
         for kind in KINDS:
             found[kind] = rths(
                 partition,
@@ -120,7 +118,7 @@ def compare_compensators(
                 criteria=criteria,
                 seed=seed,
             )
-            (told or bar)(len(found) / len(KINDS))
+            done(len(found) / len(KINDS))
 
     def rank(kind: str) -> tuple[float, float]:
         worst = _worst(found[kind])

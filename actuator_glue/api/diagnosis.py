@@ -366,9 +366,10 @@ def diagnose(
         raise InputError(
             f'holdout: moves in {held[0].motion}, and the records move in {given[0].motion}'
         )
+    every = [*given, *held]
     before = given_prior(options.prior, options.drift, options.prior_age)
     if before is not None:
-        refuse_known([*given, *held], before.sketches, before.source)
+        refuse_known(every, before.sketches, before.source)
     with (
         # Our matrices are small and our own threads use the cores: those of the linear algebra on
         # top would only wait for each other (1.5 times the time, twice that of the processor).
@@ -391,13 +392,12 @@ def diagnose(
             before=Before(before, remembered),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
-    every = [*given, *held]
     told = doubts(found, every) if found.complete else suspicions(every)
-    if told:
-        values['verdict'] = 'unexplained' if found.complete else found.verdict
-        values['advice'] = (*told, *found.advice)
+    values['advice'] = (*told, *found.advice)
+    if told and found.complete:
+        values['verdict'] = 'unexplained'
     values['seconds'] = time.perf_counter() - started
-    values['provenance'] = provenance([*given, *held], options.seed)
+    values['provenance'] = provenance(every, options.seed)
     return Diagnosis(
         **values,
         tracking=_tracking(found, given),

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from typing import Any, TypeAlias
@@ -12,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.given import number, whole
+from actuator_glue.given import number, one_thing, whole
 from actuator_glue.io.load import load_records
 from actuator_glue.records import Record
 
@@ -36,9 +35,7 @@ def records_given(
         InputError: something else was given, or a file cannot be read.
     """
     some: list[Any]
-    # Columns of a table, keys of a mapping and lines of an open file are no records.
-    whole_thing = isinstance(given, (Mapping, io.IOBase)) or hasattr(given, 'columns')
-    if isinstance(given, (Record, str, os.PathLike)) or whole_thing:
+    if isinstance(given, (Record, os.PathLike)) or one_thing(given):
         some = [given]
     else:
         try:

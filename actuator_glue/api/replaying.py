@@ -9,7 +9,6 @@ from os import PathLike, fspath
 from typing import Any, Literal, TypedDict, Unpack
 
 from actuator_glue.api.bar import shown
-from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import Records, records_given
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.replay_data import (
@@ -158,9 +157,8 @@ def replay(
     under_way.tracking = tracking
     started = time.perf_counter()
     used = _settings(under_way.live, asked)
-    with shown('replay', 1.0, False if callable(progress) else progress) as bar:
-        told = harmless(progress) if callable(progress) else None
-        comparison = _estimate(under_way, used, told or bar)
+    with shown('replay', 1.0, progress) as done:
+        comparison = _estimate(under_way, used, done)
     if not under_way.windows:
         raise InputError(f'{under_way.source}: not one window could be estimated')
     return Replay(

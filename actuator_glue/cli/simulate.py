@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.arguments import claim, number
+from actuator_glue.arguments import claim, given, number
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import note, progress
 from actuator_glue.cli._save import add_out, check_out, save
@@ -150,7 +150,7 @@ def _refuse_idle(args: argparse.Namespace) -> None:
         if args.shape != 'sweep':
             raise InputError(f'--command {args.shape} does nothing with {by}; take it out')
     for option in _OF_COMMANDS.split():
-        if getattr(args, option[2:].replace('-', '_')) is not None and option not in used:
+        if given(args, option) and option not in used:
             raise InputError(f'{option} does nothing with {by}; take it out')
     if args.plant == 'problem-r' and (args.force_noise_n, args.bits) != (None, None):
         raise InputError('--force-noise-n and --bits do nothing with --plant problem-r')

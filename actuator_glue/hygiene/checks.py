@@ -144,15 +144,15 @@ def _pushes(record: Record) -> None:
         InputError: the stiffness is off by a factor of five, or that of a free actuator where
             a specimen pushes back.
     """
-    stated, found = record.known_stiffness(), _push(record)
-    if found is None:
+    stated, found = record.known_stiffness(), _regressed(record)
+    if found is None or not found.explained:
         return
-    weight, size, separate = found
-    seen, share = abs(weight), max(abs(weight), stated) * size
+    seen = abs(found.weight)
+    share = max(seen, stated) * found.size
     if stated > 0.0:
         wrong = share > 0.1 and not 1.0 / _OFF < seen / stated < _OFF
     else:
-        wrong = separate and share > 0.5
+        wrong = found.separate and share > 0.5
     if wrong:
         raise InputError(
             f'{record.source}: force over displacement is {seen:.3g} N/m, but the specimen '
@@ -178,8 +178,8 @@ def _resists(record: Record) -> None:
 
 def pull(record: Record) -> float | None:
     """Return force over displacement [N/m], with its sign; None where that explains no force."""
-    found = _push(record)
-    return None if found is None else found[0]
+    found = _regressed(record)
+    return found.weight if found is not None and found.explained else None
 
 
 def most_push(record: Record) -> float | None:
@@ -191,18 +191,6 @@ def most_push(record: Record) -> float | None:
     if found is None or found.explained or not found.separate:
         return None
     return abs(found.weight) + _SURE * found.error
-
-
-def _push(record: Record) -> tuple[float, float, bool] | None:
-    """Return what displacement and acceleration say of the force; None if they do not explain it.
-
-    That is force over displacement [N/m], the spread of the displacement over that of the force
-    [m/N], and whether a mass could be told apart.
-    """
-    found = _regressed(record)
-    if found is None or not found.explained:
-        return None
-    return found.weight, found.size, found.separate
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.given import one_of
+from actuator_glue.given import one_of, one_thing
 from actuator_glue.io import laboratory
 from actuator_glue.io.bag_mapped import read_mapped
 from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
@@ -90,8 +89,7 @@ def load_records(
         InputError: a path cannot be used, its rate or stroke is none of a servo-hydraulic test, or
             the number of stiffnesses does not fit.
     """
-    whole_thing = isinstance(paths, (Mapping, io.IOBase)) or hasattr(paths, 'columns')
-    if isinstance(paths, (str, PathLike)) or whole_thing or not isinstance(paths, Iterable):
+    if one_thing(paths) or not isinstance(paths, Iterable):
         paths = [paths]  # type: ignore[list-item]  # what is no path is refused below
     paths = list(paths)
     if not paths:

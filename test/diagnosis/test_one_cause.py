@@ -17,7 +17,7 @@ def test_lost_motion_of_the_command_is_one_cause() -> None:
     machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (6, PLAY))) for k in (0.0, 250e3)]
     beam, found = selected_of(NAMES, machine)
     assert len(found.final.effects) > 1, 'names must explain it by more than one'
-    one = learned_terms.described(beam, found)
+    one = learned_terms.with_terms(beam, found)
     assert one is not None
     assert one.final.effects == ('learned-command-play',)
     assert one.final.fit.theta[4] == pytest.approx(PLAY, rel=0.1)
@@ -30,4 +30,4 @@ def test_two_causes_stay_two_names() -> None:
     machine = motions(effects, THETA, sweep(2e-3, 9.0, 24.0), (0.0, 250e3))
     beam, found = selected_of(NAMES, machine)
     assert set(found.final.effects) == {'backlash', 'sensor-lag'}
-    assert learned_terms.described(beam, found) is None
+    assert learned_terms.with_terms(beam, found) is None

@@ -27,7 +27,7 @@ def test_a_setting_is_tried_beside_a_learned_term() -> None:
     assert TERM in refits.terms()
     best = refits.add(refits.trial(()), TERM)
     beam.renoise(best)
-    found = beam.checked(best, refits.trial(()), found.singles, exchanged=False)
+    found = beam.checked(best, found.singles, exchanged=False)
 
     answer: Any = SimpleNamespace(
         beam=beam,

@@ -48,7 +48,7 @@ def test_friction_that_is_reached_late_has_its_shape(
     machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (kind, FRICTION))) for k in (0.0, 250e3)]
     beam, found = selected_of(names, machine)
     assert found.left < found.material
-    shaped = learned_terms.described(beam, found)
+    shaped = learned_terms.with_terms(beam, found)
     assert shaped is not None
     assert shaped.final.effects == (form,)
     force, reached = shaped.final.fit.theta[4:]
@@ -66,7 +66,7 @@ def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     machine = motions(effects, THETA, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
     beam, found = selected_of(NAMES, machine, 1)
     assert found.final.effects == ('coulomb-friction',)
-    assert learned_terms.described(beam, found) is None
+    assert learned_terms.with_terms(beam, found) is None
 
 
 VALVE = ('valve-deadband', 'coulomb-friction', 'valve-null', 'gain', 'bias')
@@ -80,7 +80,7 @@ def test_a_wrong_name_that_seems_enough_gives_way() -> None:
     machine = [(k, u, piston(u, 1.0 / RATE, MACHINE, k, (6, 25e-6))) for k in (0.0, 250e3)]
     beam, found = selected_of(mean_effects(), machine)
     assert len(found.final.effects) == 1 and found.left < found.material
-    told = learned_terms.described(beam, found)
+    told = learned_terms.with_terms(beam, found)
     assert told is not None
     assert told.final.effects == ('learned-command-play',)
     assert told.final.fit.theta[4] == pytest.approx(25e-6, rel=0.1)
@@ -93,4 +93,4 @@ def test_a_right_name_stays() -> None:
     machine = motions(effects, MACHINE, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
     beam, found = selected_of(VALVE, machine)
     assert found.final.effects == ('valve-deadband',)
-    assert learned_terms.described(beam, found) is None
+    assert learned_terms.with_terms(beam, found) is None

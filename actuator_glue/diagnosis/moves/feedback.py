@@ -66,5 +66,4 @@ def in_the_loop(beam: BeamSearch, found: Selection) -> Selection | None:
         if not worth:
             break
         best = worth[0]
-    singles = beam.rescored(found.singles)
-    return beam.checked(best, refits.trial(()), singles)
+    return beam.checked(best, found.singles)

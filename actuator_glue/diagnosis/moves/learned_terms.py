@@ -22,7 +22,7 @@ from actuator_glue.diagnosis.trial import Trial
 _LONG = 100_000  # samples
 
 
-def described(beam: BeamSearch, found: Selection) -> Selection | None:
+def with_terms(beam: BeamSearch, found: Selection) -> Selection | None:
     """Add learned terms while they have more weight.
 
     Args:
@@ -46,8 +46,7 @@ def described(beam: BeamSearch, found: Selection) -> Selection | None:
             break
     if best is found.final:
         return None
-    singles = beam.rescored(found.singles)
-    return beam.checked(best, refits.trial(()), singles, exchanged=not refits.effort.over)
+    return beam.checked(best, found.singles, exchanged=not refits.effort.over)
 
 
 def _heavier(beam: BeamSearch, found: Selection, best: Trial) -> Trial:
@@ -94,4 +93,4 @@ def _asked(beam: BeamSearch, found: Selection, best: Trial) -> list[Asked]:
 
 
 # The move for material structure.
-LEARNED_TERMS: Final[Groups] = ((AnswerMove('learned terms', left, to(described)),),)
+LEARNED_TERMS: Final[Groups] = ((AnswerMove('learned terms', left, to(with_terms)),),)

@@ -2,7 +2,7 @@
 
 A search that adds one effect at a time ends with an answer (beam_search.py). Answers that it
 cannot reach are tried here: another scope, another form, other names for everything. Of each group
-the first that leads to an answer of more weight is taken.
+the heaviest answer is taken, until none has more weight.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ WITHIN: Final[Groups] = (
     (
         AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),
         AnswerMove("one record's own setting", described, own_setting.own_setting),
-        AnswerMove('learned terms', described, to(learned_terms.described)),
+        AnswerMove('learned terms', described, to(learned_terms.with_terms)),
     ),
     (AnswerMove("the transducer's fault inside the loop", always, to(feedback.in_the_loop)),),
-    (AnswerMove('learned terms', complete, to(learned_terms.described), each_time=False),),
+    (AnswerMove('learned terms', complete, to(learned_terms.with_terms), each_time=False),),
     (AnswerMove("one record's own setting", unexplained, own_setting.own_setting),),
 )
 # Moves across holds and onsets. A change during the test can look like another hold.

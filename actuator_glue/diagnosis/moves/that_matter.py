@@ -22,4 +22,4 @@ def that_matter(beam: BeamSearch, found: Selection) -> Selection | None:
     larger = companions.with_companions(beam, current, beam.material)
     if not current.effects or larger is current:
         return None
-    return beam.checked(larger, beam.refits.trial(()), found.singles)
+    return beam.checked(larger, found.singles)

@@ -32,8 +32,7 @@ def explained(beam: BeamSearch, found: Selection) -> Selection | None:
     if best is current:
         return None
     beam.renoise(best)
-    singles = beam.rescored(found.singles)
-    return beam.checked(refits.trial(best.effects, best.added), refits.trial(()), singles)
+    return beam.checked(refits.trial(best.effects, best.added), found.singles)
 
 
 def _both(beam: BeamSearch, current: Trial) -> list[Trial]:

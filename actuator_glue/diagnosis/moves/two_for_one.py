@@ -32,7 +32,7 @@ def exchanged(beam: BeamSearch, found: Selection) -> Selection | None:
             best = _better(beam, with_more, name, best)
     if best is with_more:
         return None
-    return beam.checked(best, beam.refits.trial(()), found.singles)
+    return beam.checked(best, found.singles)
 
 
 def _with_more(beam: BeamSearch, final: Trial) -> Trial | None:

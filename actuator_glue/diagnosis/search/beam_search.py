@@ -194,7 +194,7 @@ class BeamSearch(Judge):
             current = self.refits.trial(current.effects, current.added)
         # The result of another search was already compared with its rivals there.
         spared = described or (not begun and self.refits.effort.over)
-        found = self.checked(current, base, singles, exchanged=not spared)
+        found = self.checked(current, singles, exchanged=not spared)
         if set(found.final.effects) != set(current.effects):
             steps.append(
                 SearchStep.to(found.final, 'each held against its absence and its rivals')
@@ -238,14 +238,13 @@ class BeamSearch(Judge):
         return min(trials, key=lambda t: scorer.left_out_error(t.fit))
 
     def checked(
-        self, current: Trial, base: Trial, singles: Sequence[Trial], *, exchanged: bool = True
+        self, current: Trial, singles: Sequence[Trial], *, exchanged: bool = True
     ) -> Selection:
         """Compare each member with its absence and its rivals, and note its evidence.
 
         Args:
             current: the structure.
-            base: Eq. (2).
-            singles: every single effect.
+            singles: every single effect, whatever noise it was scored with.
             exchanged: whether rivals are refitted, and take a member's place where they are
                 better; else only rivals known already are reported.
         """
@@ -259,7 +258,7 @@ class BeamSearch(Judge):
             rivals = self._known_rivals(current)
         taken, nats = worth(self.refits, current)
         return Selection(
-            base, tuple(singles), current, rivals, taken, nats,
+            self.refits.trial(()), tuple(self.rescored(singles)), current, rivals, taken, nats,
             self.first, self.left(current), self.noise, self.material, self.nats,
         )  # fmt: skip
 

@@ -92,10 +92,15 @@ class ResidualStructure(JsonObject):
         """Return the JSON object: the fields, and what follows from them."""
         return {**JsonObject.to_json(self), 'intervals_hold': self.intervals_hold}
 
+    @property
+    def averaged(self) -> str:
+        """Say over which time samples were averaged before this look; empty where none were."""
+        return f' in means over {1e3 * self.means_s:.3g} ms' if self.means_s else ''
+
     def amounts(self) -> str:
         """Return structure and noise for people."""
-        told = f'{_um(self.structure_m)} of structure over {_um(self.noise_m)} of noise'
-        return told + (f' in means over {1e3 * self.means_s:.3g} ms' if self.means_s else '')
+        amounts = f'{_um(self.structure_m)} of structure over {_um(self.noise_m)} of noise'
+        return amounts + self.averaged
 
     def problem(self) -> str | None:
         """Return why the intervals do not hold, and what to do; None where they do."""
