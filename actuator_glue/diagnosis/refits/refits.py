@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,9 +16,10 @@ from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
+from actuator_glue.diagnosis.refits.candidates import FEEDBACK
 from actuator_glue.diagnosis.refits.screening import screen, signatures
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
-from actuator_glue.diagnosis.thresholds import FAR
+from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
@@ -44,6 +45,10 @@ _FINER = 0.1  # of a usual finite-difference step
 _LONG = 5.0  # times their stretches: for longer data these tell which minimum is the lowest
 
 
+# By effect, and whether it was beside the present ones: see `Refits.screen`.
+Screens: TypeAlias = dict[tuple[str, bool], tuple[float, Array]]
+
+
 def by_score(trial: Trial) -> float:
     """Sort the best out-of-sample score first."""
     return -float(trial.scores.sum())
@@ -56,12 +61,14 @@ class Asked:
     Attributes:
         current: the structure.
         names: further effects, added one at a time.
-        below: mean squared error below which a refit is worth finishing [m^2].
+        below: mean squared error below which a refit is of use [m^2].
+        every: whether those that promise too little are listed all the same, after one step.
     """
 
     current: Trial
     names: tuple[str, ...]
     below: float = np.inf
+    every: bool = False
 
 
 def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
@@ -103,6 +110,7 @@ class Refits:
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
+    _screened: WeakKeyDictionary[Fit, Screens] = field(default_factory=WeakKeyDictionary)
     _polished: dict[frozenset[str], int] = field(default_factory=dict)
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
@@ -188,8 +196,11 @@ class Refits:
         found = [(key, fit) for key, fit in self._tried.items() if fit.rms**2 <= mean_square]
         return [(self.structure(*effects), fit) for effects, fit in found]
 
-    def add(self, current: Trial, name: str, each: Each = map) -> Trial:
-        """Refit `current` with one more effect; pass `each` where nothing else runs meanwhile."""
+    def add(self, current: Trial, name: str, each: Each = map, *, briefly: bool = False) -> Trial:
+        """Refit `current` with one more effect, `briefly` by a single step.
+
+        Pass `each` where nothing else runs meanwhile.
+        """
         model = self.structure(*current.effects, name)
         key = frozenset(model.effects)
         near = self.effort.earlier.ended.get(key)
@@ -200,16 +211,16 @@ class Refits:
             self._keep(key, found)
         elif key not in self._tried:
             starts, part = self.screen(current, name)[1], self._stand_in(model)
-            found = self._fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
-            friction = not current.effects and self.entries[name].group == 'friction'
+            starts, steps = (starts[:1], 1) if briefly else (starts, _COARSE)
+            found = self._fit(part.data, model, starts, iterations=steps, tolerance=_TOLERANCE)
+            friction = self.entries[name].group == 'friction' and not (current.effects or briefly)
             if friction and found.rms < _PROMISING * rms(current.fit.error[part.rows]):
                 found = self.effort.spent_on(
                     global_search.refit(part.data, model, found, _COARSE, _TOLERANCE, each)
                 )
             if part is not self._whole:
-                found = self._fit(
-                    self.data, model, found.theta, iterations=_FINISHED, tolerance=_TOLERANCE
-                )
+                last = {'iterations': 0 if briefly else _FINISHED, 'tolerance': _TOLERANCE}
+                found = self._fit(self.data, model, found.theta, **last)
             self._keep(key, found)
         return self.trial(model.effects, name)
 
@@ -314,6 +325,12 @@ class Refits:
             The largest share of the squared error that one of the effect's starting sizes can
             remove, and the starting parameters that promise most (s, p).
         """
+        known = self._screened.setdefault(current.fit, {})
+        if (name, beside) not in known:
+            known[name, beside] = self._screen(current, name, beside)
+        return known[name, beside]
+
+    def _screen(self, current: Trial, name: str, beside: bool) -> tuple[float, Array]:
         model = self.structure(*current.effects, name)
         part, fit = self._stand_in(self.structure(name)), current.fit
         sizes, seen = self._signature(name, part)
@@ -346,7 +363,7 @@ class Refits:
         Those near the best are finished, from a slower and a quicker valve too if need be, where
         they leave a mean squared error of less than `below` [m^2].
         """
-        asked = Asked(current, tuple(names or self.names), below)
+        asked = Asked(current, tuple(names or self.names), below, every=names is None)
         return self.additions_to([asked], progress, valves=valves)[0]
 
     def additions_to(
@@ -359,19 +376,24 @@ class Refits:
     ) -> list[list[Trial]]:
         """Refit several structures as `additions` does, all of their refits at the same time.
 
-        Those near the best of their row, or of all rows `together`, are finished.
+        Those that promise too little are left out. Those near the best of their row, or of all
+        rows `together`, are finished.
         """
-        wanted = [[(a.current, n) for n in a.names if n not in a.current.effects] for a in asked]
+        wanted = [self._wanted(a) for a in asked]
         # Two structures may lead to the same one: it is refitted from the first.
-        first: dict[frozenset[str], tuple[Trial, str]] = {}
-        for current, name in itertools.chain(*wanted):
-            first.setdefault(frozenset((*current.effects, name)), (current, name))
-        for i, _ in enumerate(self.each(lambda pair: self.add(*pair), first.values())):
+        first: dict[frozenset[str], tuple[Trial, str, bool]] = {}
+        for current, name, briefly in itertools.chain(*wanted):
+            first.setdefault(frozenset((*current.effects, name)), (current, name, briefly))
+
+        def add(refit: tuple[Trial, str, bool]) -> Trial:
+            return self.add(*refit[:2], briefly=refit[2])
+
+        for i, _ in enumerate(self.each(add, first.values())):
             if progress is not None:
                 progress((i + 1) / len(first))
             else:
                 self.effort.tell()
-        rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
+        rows = [sorted(map(add, row), key=by_score) for row in wanted]
         if together:
             every = {frozenset(t.effects): t for t in itertools.chain(*rows)}
             best = sorted(every.values(), key=by_score)
@@ -386,6 +408,24 @@ class Refits:
             self.effort.tell()
         known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
         return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
+
+    def _wanted(self, asked: Asked) -> list[tuple[Trial, str, bool]]:
+        """Return what is refitted: the structure, a further effect, whether briefly.
+
+        An effect whose signature promises far less than is of use, or than another one's, is left
+        out; where every one is listed, it is refitted briefly.
+        """
+        current = asked.current
+        names = [n for n in asked.names if n not in current.effects]
+        for _ in self.each(lambda n: self.screen(current, n), names):
+            pass
+        found = self._screened[current.fit]
+        shares = {n: max(found[key][0] for key in found if key[0] == n) for n in names}
+        of_use = 1.0 - asked.below / current.mean_square
+        least = max(shares.values(), default=0.0)
+        least = max(of_use, least) / UNDERSTATED
+        far = {n for n, share in shares.items() if share < least and n != FEEDBACK}
+        return [(current, n, n in far) for n in names if asked.every or n not in far]
 
     def promised(
         self, current: Trial, names: Iterable[str], *, beside: bool = False

@@ -19,7 +19,14 @@ from actuator_glue.diagnosis.search.judge import Judge
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import SearchStep, Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
-from actuator_glue.diagnosis.thresholds import MOST_TERMS, NAMES_FIRST, PROMISED, Thresholds
+from actuator_glue.diagnosis.thresholds import (
+    FAR,
+    MOST_TERMS,
+    NAMES_FIRST,
+    PROMISED,
+    SEEN,
+    Thresholds,
+)
 from actuator_glue.diagnosis.trial import Trial
 
 # Rounds in which members may be swapped for better or simpler ones.
@@ -75,8 +82,10 @@ class BeamSearch(Judge):
         Tried before many names are added: for a machine outside the catalogue, further names would
         cost the time that a description needs.
         """
+        enough = FAR * (self.noise**2 + self.material**2)
         starts = self.refits.trial(()), current
-        rows = self.refits.additions_to([Asked(s, self.promising_terms(s)) for s in starts])
+        asked = [Asked(s, self.promising_terms(s, enough), enough) for s in starts]
+        rows = self.refits.additions_to(asked)
         return any(self.left(trial) < self.material for trial in itertools.chain(*rows))
 
     def promising_terms(self, current: Trial, below: float = math.inf) -> tuple[str, ...]:
@@ -118,7 +127,9 @@ class BeamSearch(Judge):
         """Add effects while each is worth it, then check each against its rivals."""
         self.renoise()
         base = self.refits.trial(())
-        singles = self.refits.additions(base, None, lambda d: self.progress('effect 1', d))
+        below = base.mean_square - (SEEN * self.material) ** 2
+        tell = partial(self.progress, 'effect 1')
+        singles = self.refits.additions(base, None, tell, below=below)
         self.renoise(self._nearest(singles))
         base, singles = self.refits.trial(()), self.rescored(singles)
         self._set_nats()
