@@ -409,6 +409,12 @@ class Refits:
         known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
         return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
 
+    def _promise(self, current: Trial, name: str) -> float:
+        """Return the largest share of the squared error that an effect's signatures promise."""
+        self.screen(current, name)
+        known = self._screened[current.fit]
+        return max(known[key][0] for key in ((name, False), (name, True)) if key in known)
+
     def _wanted(self, asked: Asked) -> list[tuple[Trial, str, bool]]:
         """Return what is refitted: the structure, a further effect, whether briefly.
 
@@ -417,13 +423,11 @@ class Refits:
         """
         current = asked.current
         names = [n for n in asked.names if n not in current.effects]
-        for _ in self.each(lambda n: self.screen(current, n), names):
-            pass
-        found = self._screened[current.fit]
-        shares = {n: max(found[key][0] for key in found if key[0] == n) for n in names}
+        shares = dict(
+            zip(names, self.each(lambda n: self._promise(current, n), names), strict=True)
+        )
         of_use = 1.0 - asked.below / current.mean_square
-        least = max(shares.values(), default=0.0)
-        least = max(of_use, least) / UNDERSTATED
+        least = max(of_use, *shares.values()) / UNDERSTATED if shares else 0.0
         far = {n for n, share in shares.items() if share < least and n != FEEDBACK}
         return [(current, n, n in far) for n in names if asked.every or n not in far]
 
