@@ -35,7 +35,7 @@ def test_a_refit_that_leaves_far_less_is_finished_whatever_its_score(seed: int) 
     finished = []
 
     class Rough(Refits):
-        def _promise(self, current: Trial, name: str) -> float:
+        def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
             return 0.5
 
         def add(
@@ -61,7 +61,7 @@ def test_what_promises_far_less_than_another_is_left_out_or_listed_after_one_ste
     asked = dict[str, bool]()
 
     class Promising(Refits):
-        def _promise(self, current: Trial, name: str) -> float:
+        def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
             return promised[name]
 
         def add(
