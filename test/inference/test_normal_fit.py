@@ -32,7 +32,9 @@ def test_a_skewed_density_is_told_better_than_its_draws_do(rng_seed):
 
     rng = np.random.default_rng(rng_seed)
     errors = []
-    for _ in range(40):
+    # The ratio of variances is 0.217 with a standard deviation of 0.026 over 40 repeats (one run in
+    # a thousand is above the limit), of 0.012 over 200.
+    for _ in range(200):
         at = np.log(rng.gamma(100.0, size=(400, 2)))
         found = refined(at, (100.0 * at - np.exp(at)).sum(axis=1))
         errors.append(
