@@ -10,6 +10,7 @@ or a drift, are known depends on the noise next to 0 Hz, which takes longer wind
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -131,6 +132,15 @@ def whitener(part: Split) -> Array:
     return np.asarray(taps * np.hanning(len(taps) + 1)[:-1])
 
 
+@lru_cache(maxsize=64)  # many short rows are filtered one by one
+def _gain(taps: bytes, size: int) -> Array:
+    """Return the real spectrum of a zero-phase filter over `size` samples."""
+    known, spread = np.frombuffer(taps), np.zeros(size)
+    half = len(known) // 2
+    spread[:half], spread[-half:] = known[half:], known[:half]
+    return np.asarray(scipy.fft.rfft(spread).real)
+
+
 def whiten(rows: Array, taps: Array) -> Array:
     """Filter rows (..., n) with a zero-phase whitening filter, length kept.
 
@@ -143,9 +153,7 @@ def whiten(rows: Array, taps: Array) -> Array:
     blocks = -(-count // (_FILTERS * len(taps)))
     step = -(-count // blocks)
     size = scipy.fft.next_fast_len(step + 2 * half, real=True)
-    spread = np.zeros(size)
-    spread[:half], spread[-half:] = taps[half:], taps[:half]
-    gain = scipy.fft.rfft(spread).real
+    gain = _gain(taps.tobytes(), size)
     out = np.empty((len(table), blocks * step))
     at_once = max(1, _AT_ONCE // (blocks * size))
     for some in (slice(i, i + at_once) for i in range(0, len(table), at_once)):

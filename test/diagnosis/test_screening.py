@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.refits.screening import screen
+from actuator_glue.diagnosis.refits.screening import Remainder, screen
 from actuator_glue.model.parameters import Parameter
 
 
@@ -16,7 +16,7 @@ def test_what_diverged_promises_nothing(far: float, rng_seed: int) -> None:
     parameters, sizes = [Parameter('size', 'm', 0.0, 10.0, 'size', 0.0)], np.array([[1.0], [2.0]])
     seen = 0.1 * np.stack([error, np.where(np.arange(500) < 400, 0.0, error)])
     seen[1, 400:] = far
-    share, best = screen(parameters, sizes, seen, error, jacobian)
+    share, best = screen(parameters, sizes, seen, Remainder.of(error, jacobian))
     assert share == pytest.approx(1.0, abs=0.05)
     # Ten times as much is asked for, four times at most.
     assert best[0, 0] == pytest.approx(4.0)

@@ -17,7 +17,7 @@ from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
 from actuator_glue.diagnosis.refits.candidates import FEEDBACK
-from actuator_glue.diagnosis.refits.screening import screen, signatures
+from actuator_glue.diagnosis.refits.screening import Remainder, screen, signatures
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
 from actuator_glue.diagnosis.trial import Trial
@@ -111,6 +111,7 @@ class Refits:
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
     _screened: WeakKeyDictionary[Fit, Screens] = field(default_factory=WeakKeyDictionary)
+    _remainders: dict[bool, tuple[Fit, Remainder]] = field(default_factory=dict)
     _polished: dict[frozenset[str], int] = field(default_factory=dict)
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
@@ -342,12 +343,20 @@ class Refits:
             thetas[:, new], thetas[:, ~new] = own, fit.theta
             return thetas
 
-        error = fit.error[part.rows]
         if beside:
-            seen = part.data.simulate(model, with_others(sizes)) - (part.data.target - error)
-        parameters, jacobian = self.entries[name].parameters, fit.jacobian_of(part.rows)
-        share, best = screen(parameters, sizes, seen, error, jacobian)
+            simulated = part.data.target - fit.error[part.rows]
+            seen = part.data.simulate(model, with_others(sizes)) - simulated
+        left = self._remainder(fit, part)
+        share, best = screen(self.entries[name].parameters, sizes, seen, left)
         return share, with_others(best)
+
+    def _remainder(self, fit: Fit, part: Part) -> Remainder:
+        """What a fit's parameters leave of its error; that of the last fit is kept."""
+        known = self._remainders.get(part is self._whole)
+        if known is None or known[0] is not fit:
+            left = Remainder.of(fit.error[part.rows], fit.jacobian_of(part.rows))
+            self._remainders[part is self._whole] = known = fit, left
+        return known[1]
 
     def additions(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _STARTS = 4  # starting sizes that survive the screening (the kernel works on 32 at a time)
+_SAME = 1e-9  # of the largest: parameters that move the response alike
 _FINITE = 1e6  # m: what goes beyond has diverged
 
 
@@ -23,8 +25,31 @@ def signatures(data: Data, model: Model, thetas: Array, base: Array) -> Array:
     return output
 
 
+@dataclass(frozen=True)
+class Remainder:
+    """What a structure's parameters, refitted linearly, cannot take up.
+
+    Attributes:
+        error: of its residual (N,) [m].
+        taken: orthonormal directions that they span (r, N).
+    """
+
+    error: Array
+    taken: Array
+
+    @classmethod
+    def of(cls, error: Array, jacobian: Array) -> Remainder:
+        """Return it for a residual (N,) [m] and the simulation's derivative (p, N)."""
+        scales = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
+        jac = jacobian[scales > 0] / scales[scales > 0, None]
+        values, vectors = np.linalg.eigh(jac @ jac.T)
+        kept = values > _SAME * values.max(initial=0.0)
+        taken = (vectors[:, kept] / np.sqrt(values[kept])).T @ jac
+        return cls(error - (taken @ error) @ taken, taken)
+
+
 def screen(
-    parameters: Sequence[Parameter], sizes: Array, seen: Array, error: Array, jacobian: Array
+    parameters: Sequence[Parameter], sizes: Array, seen: Array, remainder: Remainder
 ) -> tuple[float, Array]:
     """Project a residual on an effect's signatures, the present parameters refitted linearly.
 
@@ -32,8 +57,7 @@ def screen(
         parameters: the effect's (k,).
         sizes: its starting sizes (s, k).
         seen: their signatures (s, N) [m].
-        error: the residual (N,) [m].
-        jacobian: derivative of the simulation to the present parameters, (p, N).
+        remainder: of the residual.
 
     Returns:
         The largest share of the squared error that one of the sizes can remove, and the sizes
@@ -41,14 +65,12 @@ def screen(
     """
     neutral = np.array([p.neutral if p.neutral is not None else 0.0 for p in parameters])
     lower, upper = np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
+    error, taken = remainder.error, remainder.taken
     # Finite values may still overflow in products.
     alive = np.asarray((np.abs(seen) < _FINITE).all(axis=1))
-    seen = np.where(alive[:, None], seen, 0.0)
-    scales = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
-    jac = jacobian[scales > 0] / scales[scales > 0, None]
-    inverse = np.linalg.pinv(jac @ jac.T, rcond=1e-9)
-    error = error - jac.T @ (inverse @ (jac @ error))
-    free = seen - (seen @ jac.T @ inverse) @ jac
+    if not alive.all():
+        seen = np.where(alive[:, None], seen, 0.0)
+    free = seen - (seen @ taken.T) @ taken
     free[np.abs(free).max(axis=1) > 1.0] = 0.0  # a metre of residual: it diverged
     power = np.einsum('sn,sn->s', free, free)
     cross = free @ error

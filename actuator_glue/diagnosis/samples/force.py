@@ -11,7 +11,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import pull, where
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.decimate import decimated
-from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.free_run import Model, ObservedChannel
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import recorded_force, shown
 from actuator_glue.records import Array, Record
@@ -21,7 +21,7 @@ _LARGEST = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceRecord(Record):
+class ForceRecord(ObservedChannel, Record):
     """A record whose measured channel is its force, in units of `newtons` per metre.
 
     Attributes:

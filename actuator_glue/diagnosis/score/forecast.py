@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.score.regression import library
@@ -273,8 +274,11 @@ class _Past:
     def rows(self, record: int, motion: Array, at: NDArray[np.intp]) -> Array:
         """A record's motion (n,) at each lag before some samples, (L, len(at)); 0 before it."""
         steps = np.rint(self.lags / self.data.periods[record]).astype(np.intp)
-        index = at - steps[:, None]
-        return np.asarray(np.where(index >= 0, motion[np.maximum(index, 0)], 0.0))
+        reach, first, length = int(steps[-1]), int(at[0]), int(at[-1] - at[0]) + 1
+        known = motion[max(0, first - reach) : first + length]
+        longer = np.concatenate([np.zeros(reach + length - len(known)), known])
+        found = sliding_window_view(longer, length)[reach - steps]
+        return found if len(at) == length else found[:, at - first]
 
 
 def _blocks(data: Data, scorer: Scorer) -> Iterator[tuple[int, slice, int, NDArray[np.intp]]]:
@@ -327,7 +331,8 @@ def _sizes(products: Array, count: float, own: int, lags: Array) -> Array:
 
     # For features, for lags, then for features given the lags.
     best = max(((s, 0.0, 1.0) for s in _SIZES), key=likelihood)
-    best = max(((best[0], s, fading) for s, fading in product(_SIZES, _FADING)), key=likelihood)
+    fading = ((best[0], s, fading) for s, fading in product(_SIZES[1:], _FADING))
+    best = max(chain([best], fading), key=likelihood)
     return sized(*max(((s, *best[1:]) for s in _SIZES), key=likelihood))
 
 
@@ -346,9 +351,10 @@ def _ridge(products: Array, count: float, sizes: Array) -> tuple[float, Array]:
     use, out = sizes > _NONE * sizes.max(initial=0.0), np.zeros(len(sizes))
     size = sizes[use]
     firm = products[:-1, :-1][np.ix_(use, use)] * np.outer(size, size)
-    factor = scipy.linalg.cho_factor(firm + np.eye(len(size)), lower=True)
+    firm[np.diag_indices(len(size))] += 1.0
+    factor = scipy.linalg.cho_factor(firm, lower=True, overwrite_a=True, check_finite=False)
     pull = size * products[:-1, -1][use]
-    means = scipy.linalg.cho_solve(factor, pull)
+    means = scipy.linalg.cho_solve(factor, pull, check_finite=False)
     out[use] = size * means
     spread = np.log(np.diag(factor[0])).sum()
     return float(-0.5 * count * np.log(products[-1, -1] - pull @ means) - spread), out

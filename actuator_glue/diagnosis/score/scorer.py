@@ -136,11 +136,8 @@ class Scorer:
             j = jac[:, block]
             normals[i] -= j @ j.T
             pulls[i] -= j @ error[block]
-        steps = np.linalg.solve(normals, pulls[..., None])[..., 0]
-        for i in np.flatnonzero(((steps < room[0]) | (steps > room[1])).any(axis=1)):
-            steps[i] = _step(normals[i], pulls[i], room)
         out = np.zeros((len(blocks), len(known)))
-        out[:, known] = steps / scale
+        out[:, known] = _steps(normals, pulls, room) / scale
         return out
 
 
@@ -150,17 +147,23 @@ def _plain(fit: Fit) -> tuple[Array, Array]:
     return fit.error / size, fit.jacobian / size
 
 
-def _step(normal: Array, pull: Array, room: Array) -> Array:
-    """Return the Gauss-Newton step (p,); parameters stop at the end of their room (2, p)."""
-    step, free = np.zeros(len(pull)), np.ones(len(pull), dtype=np.bool_)
-    while free.any():
-        rest = pull - normal[:, ~free] @ step[~free]
-        step[free] = np.linalg.solve(normal[np.ix_(free, free)], rest[free])
-        out = free & ((step < room[0]) | (step > room[1]))
-        if not out.any():
-            break
-        step, free = np.clip(step, *room), free & ~out
-    return step
+def _steps(normals: Array, pulls: Array, room: Array) -> Array:
+    """Return Gauss-Newton steps (B, p); parameters stop at the end of their room (2, p)."""
+    steps = np.asarray(np.linalg.solve(normals, pulls[..., None])[..., 0])
+    free, left = np.ones(pulls.shape, dtype=np.bool_), np.arange(len(pulls))
+    while left.size:
+        out = free[left] & ((steps[left] < room[0]) | (steps[left] > room[1]))
+        left, out = left[out.any(axis=1)], out[out.any(axis=1)]
+        steps[left], free[left] = np.clip(steps[left], *room), free[left] & ~out
+        left = left[free[left].any(axis=1)]
+        # What is stopped takes the place of its equation: it is where it is.
+        stopped, normal = ~free[left], normals[left]
+        pull = pulls[left] - np.einsum('bij,bj->bi', normal, np.where(stopped, steps[left], 0.0))
+        both = stopped[:, :, None] | stopped[:, None, :]
+        normal = np.where(both, np.eye(pulls.shape[1]) * stopped[:, :, None], normal)
+        pull = np.where(stopped, steps[left], pull)
+        steps[left] = np.linalg.solve(normal, pull[..., None])[..., 0]
+    return steps
 
 
 def evidence(scores: Array, reference: Array) -> float:

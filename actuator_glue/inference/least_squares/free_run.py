@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +42,12 @@ class Model(Protocol):
         """
 
 
-@runtime_checkable
-class ObservedChannel(Protocol):
+class ObservedChannel(ABC):
     """A record that shows something else than the displacement (diagnosis/samples/force.py)."""
 
+    __slots__ = ()
+
+    @abstractmethod
     def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
         """What its measured channel shows of theta (m, p), (m, n)."""
 

@@ -112,8 +112,11 @@ def _differences(
     """
     (z, steps), (out, output) = at, found
     out -= output[:, None, :]
-    stable = np.isfinite(output).all(axis=-1, keepdims=True)
-    over = np.logical_and(diverged(out, data.target), stable)
+    far = diverged(out, data.target)
+    if not far.any():
+        out /= steps[:, :, None]
+        return out
+    over = np.logical_and(far, np.isfinite(output).all(axis=-1, keepdims=True))
     if over.any():
         steps = np.where(over, -steps, steps)
         back = _moved(z, steps)[over]

@@ -55,7 +55,7 @@ def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Ar
         natural = np.sqrt(values['alpha_1_beta_0'] / (values['alpha_2'] + stiffness))
         fastest = np.maximum(values['beta_1'], natural) * step / _MAX_POLE_STEP
         factor = 2.0 ** np.ceil(np.log2(fastest))
-    return np.asarray(np.clip(np.nan_to_num(factor, nan=1.0), 1.0, _MAX_REFINEMENT))
+    return np.asarray(np.minimum(np.fmax(factor, 1.0), _MAX_REFINEMENT))  # NaN becomes 1
 
 
 # Absurd parameters make NaN or infinite responses, seen by who asked for them, not warnings.
