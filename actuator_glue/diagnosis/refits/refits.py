@@ -42,6 +42,7 @@ _PROMISING = 0.95  # of the error: friction that leaves less is searched for glo
 _POLISHED = 4
 _LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a reported structure, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
+_SCREENED = 30.0  # s of stretches on which signatures are seen
 _LONG = 5.0  # times their stretches: for longer data these tell which minimum is the lowest
 
 
@@ -288,6 +289,14 @@ class Refits:
     def _stretches(self) -> Part:
         return stretches(self.data) or self._whole
 
+    def _seen_on(self, name: str) -> Part:
+        """Return the data on which an effect's signatures are seen."""
+        return self._whole if self.entries[name].record_time else self._glances
+
+    @cached_property
+    def _glances(self) -> Part:
+        return stretches(self.data, _SCREENED) or self._whole
+
     def _signature(self, name: str, part: Part) -> tuple[Array, Array]:
         """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, M)."""
         if name not in self._signatures:
@@ -299,7 +308,7 @@ class Refits:
 
     def signature(self, name: str) -> tuple[Array, Array]:
         """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
-        return self._signature(name, self._stand_in(self.structure(name)))
+        return self._signature(name, self._seen_on(name))
 
     def signatures(self) -> tuple[Array, Array, Scorer]:
         """Every effect's signatures at all its starting sizes (s, M) [m].
@@ -307,9 +316,9 @@ class Refits:
         And what they are seen against: the Jacobian of Eq. (2) (4, M), and the noise.
         """
         assert self.scorer is not None
-        part, rows = self._stretches, []
+        part, rows = self._glances, []
         for name in self.names:
-            own, seen = self._stand_in(self.structure(name)), self.signature(name)[1]
+            own, seen = self._seen_on(name), self.signature(name)[1]
             rows.append(seen if own is part else seen[:, part.rows])
         every = np.concatenate(rows)
         jacobian = self._tried[frozenset()].jacobian_of(part.rows)
@@ -333,7 +342,7 @@ class Refits:
 
     def _screen(self, current: Trial, name: str, beside: bool) -> tuple[float, Array]:
         model = self.structure(*current.effects, name)
-        part, fit = self._stand_in(self.structure(name)), current.fit
+        part, fit = self._seen_on(name), current.fit
         sizes, seen = self._signature(name, part)
         new = np.zeros(len(model.parameters), dtype=np.bool_)
         new[model.columns(name)] = True

@@ -15,7 +15,7 @@ from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.model.exact import Initial
 
 _LENGTH = 5.0  # s of a stretch, its settling not counted
-_TOTAL = 60.0  # s of all stretches
+TOTAL = 60.0  # s of all stretches
 _LONG = 2.0  # times as much as them: shorter records are taken whole
 
 
@@ -34,15 +34,20 @@ class Part:
     records: tuple[int, ...]
 
 
-def stretches(data: Data) -> Part | None:
-    """Return stretches that stand for long records; None where the records are not long."""
+def stretches(data: Data, most: float = TOTAL) -> Part | None:
+    """Return stretches that stand for long records; None where the records are not long.
+
+    Args:
+        data: the records.
+        most: length of all stretches [s].
+    """
     total = sum(record.duration for record in data.records)
-    if total < _LONG * _TOTAL:
+    if total < _LONG * most:
         return None
     records, masks, initials, origins, rows, of = [], [], [], [], [], []
     for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
         place = data.parts[i].start + np.cumsum(mask) - 1
-        count = max(1, round(_TOTAL * record.duration / total / _LENGTH))
+        count = max(1, round(most * record.duration / total / _LENGTH))
         size = min(len(record), round((_LENGTH + SETTLE) / record.period))
         for begin in np.linspace(0, len(record) - size, count).astype(int).tolist():
             initial: Initial = data.initials[i] if begin == 0 else 'measured'
