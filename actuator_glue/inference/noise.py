@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -92,24 +93,45 @@ def _densities(error: Array, period: float, width: int) -> tuple[Array, Array, A
     return frequency, level, power.mean(axis=1)
 
 
+class _Halves(NamedTuple):
+    """Mean squares of a residual and of its noise [m^2], without its trend (n,), and densities."""
+
+    mean_square: float
+    noise2: float
+    centred: Array
+    densities: tuple[Array, Array, Array]
+
+
+def _halves(error: Array, period: float) -> _Halves:
+    n = len(error)
+    width = 2 * max(8, min(round(_WINDOW / period), n // 8) // 2)
+    centred = scipy.signal.detrend(error)
+    densities = _, level, total = _densities(centred, period, width)
+    mean_square = float(np.mean(error**2))
+    # Both ends of the axis have half a bin.
+    whole = float(np.trapezoid(total))
+    share = float(np.trapezoid(level)) / whole if whole > 0 else 0.0
+    noise2 = min(share * float(np.mean(centred**2)), mean_square)
+    return _Halves(mean_square, noise2, centred, densities)
+
+
+def structured(error: Array, period: float) -> float:
+    """Return the mean square of the structure in a residual (n,) [m^2], as `split` finds it."""
+    found = _halves(error, period)
+    return found.mean_square - found.noise2
+
+
 def split(error: Array, period: float) -> Split:
     """Split the residual (n,) [m] of one record.
 
     Mean and linear trend count as structure: noise has none.
     """
     n = len(error)
-    width = 2 * max(8, min(round(_WINDOW / period), n // 8) // 2)
-    centred = scipy.signal.detrend(error)
-    frequency, level, total = _densities(centred, period, width)
-    mean_square = float(np.mean(error**2))
-    # Both ends of the axis have half a bin.
-    whole = float(np.trapezoid(total))
-    share = float(np.trapezoid(level)) / whole if whole > 0 else 0.0
+    mean_square, noise2, centred, (frequency, level, total) = _halves(error, period)
     longer = 2 * max(8, min(round(_SLOW / period), n // 4) // 2)
     low, below, all_below = _densities(centred, period, longer)
     near = low <= (_BLEND[1] + 2.0) * frequency[1]
-    floor = 1e-12 * whole / len(level) + 1e-300
-    noise2 = min(share * float(np.mean(centred**2)), mean_square)
+    floor = 1e-12 * float(np.trapezoid(total)) / len(level) + 1e-300
     return Split(
         noise=float(np.sqrt(noise2)),
         structure=float(np.sqrt(mean_square - noise2)),

@@ -14,7 +14,7 @@ from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
-from actuator_glue.inference.noise import Split, split
+from actuator_glue.inference.noise import Split, structured
 from actuator_glue.json_value import JsonObject
 from actuator_glue.records import Array
 
@@ -47,29 +47,39 @@ class Alarm(JsonObject):
     tests: dict[str, float] = field(default_factory=dict)
 
 
-def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
-    """Gaussian noise (size,) with the noise density of a split: the null of the alarm [m]."""
-    whole = scipy.fft.next_fast_len(size, real=True)
-    frequency = np.asarray(np.fft.rfftfreq(whole, period), dtype=np.float64)
-    density = part.density(frequency)
-    # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
-    spectrum = np.sqrt(0.25 * density * whole / period) * (
-        rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))
-    )
-    spectrum[0] = 0.0
-    return np.fft.irfft(spectrum, whole)[:size]
+class StationaryNoise:
+    """Gaussian noise with the noise density of a split: the null of the alarm.
+
+    Args:
+        part: the split.
+        size: samples.
+        period: of a sample [s].
+    """
+
+    def __init__(self, part: Split, size: int, period: float) -> None:
+        self.size, self.period = size, period
+        self._whole = scipy.fft.next_fast_len(size, real=True)
+        frequency = np.asarray(np.fft.rfftfreq(self._whole, period), dtype=np.float64)
+        # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
+        self._roots = np.sqrt(0.25 * part.density(frequency) * self._whole / period)
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """Return noise (size,) [m]."""
+        count = len(self._roots)
+        spectrum = self._roots * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
+        spectrum[0] = 0.0
+        return np.fft.irfft(spectrum, self._whole)[: self.size]
 
 
 def p_value(data: Data, splits: list[Split], seed: int, each: Each = map) -> float:
     """Bootstrap p-value of the structure of all records under stationary noise."""
     observed = sum(s.mean_square - s.noise**2 for s in splits)
+    rows = zip(splits, data.parts, data.periods, strict=True)
+    null = [StationaryNoise(part, at.stop - at.start, period) for part, at, period in rows]
 
     def by_chance(number: int) -> float:
-        rng, total = np.random.default_rng([seed, 2, number]), 0.0
-        for part, where, period in zip(splits, data.parts, data.periods, strict=True):
-            again = split(surrogate(part, where.stop - where.start, period, rng), period)
-            total += again.mean_square - again.noise**2
-        return total
+        rng = np.random.default_rng([seed, 2, number])
+        return sum(structured(noise.draw(rng), noise.period) for noise in null)
 
     above = sum(total >= observed for total in each(by_chance, range(_RESAMPLES)))
     return (1 + above) / (_RESAMPLES + 1)
