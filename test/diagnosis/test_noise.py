@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.inference.noise import split, whiten, whitener
+from actuator_glue.diagnosis.verdict.detect import p_value
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.noise import split, structured, whiten, whitener
+from actuator_glue.records import Record
 
 RATE = 256.0
 N = 15360
@@ -24,6 +27,16 @@ def test_stationary_noise_is_all_noise(colour: float, corner: float) -> None:
     parts = [(split(e, 1 / RATE), e) for e in (noise(rng, colour, corner) for _ in range(12))]
     share = np.mean([s.noise**2 / np.mean(e**2) for s, e in parts])
     assert abs(share - 1.0) < 0.08
+
+
+def test_a_p_value_of_no_structure_is_one_and_of_a_burst_small(rng_seed: int) -> None:
+    """No structure at all is what chance brings always, however rounded."""
+    rng = np.random.default_rng(rng_seed)
+    still = next(e for e in (rng.standard_normal(N) for _ in range(1000)) if structured(e, 1) == 0)
+    burst = still + np.where(np.arange(N) < N // 4, rng.standard_normal(N), 0.0)
+    data = Data.whole([Record(np.zeros(N), np.zeros(N), 1.0, stiffness=0.0)])
+    assert p_value(data, still, 1) == 1.0
+    assert p_value(data, burst, 1) == 0.01
 
 
 def test_whitened_noise_is_white() -> None:
