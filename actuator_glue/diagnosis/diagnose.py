@@ -73,7 +73,6 @@ def diagnose(
     some = wrong_setup.stretched(ready.fit)
     given = base_fit(some)
     look = FirstLook.of(some, given, settings)
-    done.missing = look.missing
     if first_look is not None:
         first_look(look)
     other = wrong_setup.find(ready.fit, settings, given=given)

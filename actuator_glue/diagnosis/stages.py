@@ -41,15 +41,14 @@ _BEGUN = 0.06
 _AFTER: dict[Stage, float] = {
     'check': 0.0,
     'base fit': 0.01,
-    'posterior before': 0.8,
-    'posterior': 0.81,
+    'posterior before': 0.75,
+    'posterior': 0.76,
     'held-out': 0.9,
     'done': 1.0,
 }
-# Effort of a whole search over that of its first stage: where Eq. (2) shows nothing that matters,
-# where it does, and once something was found. With these, the time left was told within a factor
-# of two at three quarters of the moments, on 20 machines (seeds 94012 to 94016).
-_HEALTHY, _MISSING, _FOUND = 2.0, 3.0, 2.0
+# Effort of a whole search over that of its first stage: where no signature promises what matters,
+# where one does, and once something was found.
+_HEALTHY, _MISSING, _FOUND = 1.3, 5.0, 1.5
 
 
 class ShareDone:
@@ -60,14 +59,13 @@ class ShareDone:
 
     Attributes:
         effort: of the search.
-        missing: whether Eq. (2) leaves more than noise.
         now: the stage that was told last, and the share of it that is done.
     """
 
     def __init__(self, effort: Effort) -> None:
-        self.effort, self.missing = effort, True
+        self.effort = effort
         self.now: tuple[Stage, float] = ('check', 0.0)
-        self._first, self._open, self._done = 0.0, False, 0.0
+        self._first, self._beyond, self._open, self._done = 0.0, False, False, 0.0
 
     def __call__(self, stage: Stage, share: float) -> float:
         """Take the share of a stage that is done, in [0, 1]; return that of the whole."""
@@ -85,11 +83,12 @@ class ShareDone:
     def _searched(self, stage: str, share: float) -> float:
         spent = self.effort.share
         self._open |= stage in EFFECTS[1:]
-        times = _MISSING if self.missing else _HEALTHY
-        if stage == EFFECTS[0]:
-            self._first = spent / max(share, 0.05)
+        self._beyond |= stage != EFFECTS[0]
+        if self._beyond:  # also in the first stage of a further search
+            expected = 1.0 if self._open else self._first * _FOUND
         else:
-            times = _FOUND
-        expected = 1.0 if self._open else self._first * times
+            self._first = spent / max(share, 0.05)
+            times = _MISSING if self.effort.promising else _HEALTHY
+            expected = min(self._first * times, max(1.0, self._first))
         done = min(spent / max(expected, 1.1 * spent, 1e-9), 1.0)
         return _BEGUN + done * (_AFTER['posterior before'] - _BEGUN)

@@ -128,6 +128,8 @@ class BeamSearch(Judge):
         self.renoise()
         base = self.refits.trial(())
         below = base.mean_square - (SEEN * self.material) ** 2
+        promised = self.refits.promised(base, self.refits.names)
+        self.refits.effort.expects(any(left < below for _, left in promised))
         tell = partial(self.progress, 'effect 1')
         singles = self.refits.additions(base, None, tell, below=below)
         self.renoise(self._nearest(singles))
