@@ -47,8 +47,9 @@ _AFTER: dict[Stage, float] = {
     'done': 1.0,
 }
 # Effort of a whole search over that of its first stage: where no signature promises what matters,
-# where one does, and once something was found.
-_HEALTHY, _MISSING, _FOUND = 1.3, 5.0, 1.5
+# where one does, and once something was found. With these, the time left was told within a factor
+# of two, or a second, at two thirds of the moments, on 56 machines (seeds 94120 to 94133).
+_HEALTHY, _MISSING, _FOUND = 1.3, 3.0, 1.5
 
 
 class ShareDone:
