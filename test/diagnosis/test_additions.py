@@ -9,6 +9,7 @@ import pytest
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.structure import Structure
 
 # Score [nats] and error [um] of each refit before it is finished.
@@ -80,3 +81,33 @@ def test_what_promises_far_less_than_another_is_left_out_or_listed_after_one_ste
     asked.clear()
     Promising(data, tuple(promised)).additions(base, tuple(promised))
     assert asked == {'drift': False, 'backlash': False}
+
+
+@pytest.mark.parametrize(('remains', 'refitted'), [(0.9, ['drift', 'gain']), (0.2, [])])
+def test_where_no_signature_promises_any_of_much_structure_each_is_refitted(
+    remains: float, refitted: list[str]
+) -> None:
+    """A gain of one record alone bends Eq. (2) so far that signatures promise nothing."""
+    asked = list[str]()
+
+    class Silent(Refits):
+        def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
+            return 1e-3
+
+        def _structure(self, fit: Fit) -> float:
+            return remains
+
+        def add(
+            self, current: Trial, name: str, each: Each = map, *, briefly: bool = False
+        ) -> Trial:
+            asked.append(name)
+            return trial(name, -100.0, 66.0)
+
+        def polish(self, found: Trial, valves: bool = True) -> Trial:
+            return found
+
+    data: Any = None
+    base = trial('hum', -100.0, 67.0)
+    refits = Silent(data, ('drift', 'gain'))
+    refits.additions(base, refits.names, below=0.9 * base.mean_square)
+    assert sorted(set(asked)) == refitted

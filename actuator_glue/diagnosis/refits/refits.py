@@ -18,7 +18,7 @@ from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
 from actuator_glue.diagnosis.refits.candidates import FEEDBACK
 from actuator_glue.diagnosis.refits.screening import Remainder, screen, signatures
-from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -443,15 +443,23 @@ class Refits:
         """Return what is refitted: the structure, a further effect, whether briefly.
 
         An effect whose signature promises far less than is of use, or than another one's, is left
-        out; where every one is listed, it is refitted briefly.
+        out; where every one is listed, it is refitted briefly. Where far more structure remains
+        than is of use, and no signature promises any of that, they say nothing: each is refitted.
         """
         current = asked.current
         names = [n for n in asked.names if n not in current.effects]
         shares = list(self.each(lambda n: self._promise(current, n), names))
-        least = max([1.0 - asked.below / current.mean_square, *shares]) / UNDERSTATED
+        use = max(0.0, 1.0 - asked.below / current.mean_square)
+        least = max([use, *shares]) / UNDERSTATED
         shares = list(self.each(lambda n: self._promise(current, n, least), names))
+        if max(shares, default=0.0) < least and self._structure(current.fit) > UNDERSTATED * use:
+            least = 0.0
         far = {n for n, s in zip(names, shares, strict=True) if s < least and n != FEEDBACK}
         return [(current, n, n in far) for n in names if asked.every or n not in far]
+
+    def _structure(self, fit: Fit) -> float:
+        """Return the share of a fit's squared error that is no noise."""
+        return (pooled(self.data, splits_of(self.data, fit.error))[0] / fit.rms) ** 2
 
     def promised(
         self, current: Trial, names: Iterable[str], *, beside: bool = False
