@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.posterior.answer_posterior import sampled
 from actuator_glue.diagnosis.remembered import Before, Remembered
 from actuator_glue.diagnosis.samples.force import check_forces
 from actuator_glue.diagnosis.samples.preparation import prepare
-from actuator_glue.diagnosis.scopes import wrong_setup
+from actuator_glue.diagnosis.scopes import hold_and_stiffness
 from actuator_glue.diagnosis.stages import Progress, ShareDone, Stage
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.telling.telling import told
@@ -70,12 +70,12 @@ def diagnose(
     if settings.use_force:
         check_forces(records)
     ready = prepare(records, held, known)
-    some = wrong_setup.stretched(ready.fit)
+    some = hold_and_stiffness.stretched(ready.fit)
     given = base_fit(some)
     look = FirstLook.of(some, given, settings)
     if first_look is not None:
         first_look(look)
-    other = wrong_setup.find(ready.fit, settings, given=given)
+    other = hold_and_stiffness.find(ready.fit, settings, given=given)
     if other is not None and other.runs_linearly:
         # The search starts with the likelier hold and decides between both at its end.
         ready, other = ready.with_hold('linear', replace(other, taken=True)), None

@@ -10,7 +10,7 @@ import pytest
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.finding import Finding, Rival
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.telling.advice import contradicted, zeros
 from actuator_glue.diagnosis.telling.headline import headline
 from actuator_glue.diagnosis.telling.result import DiagnosisData

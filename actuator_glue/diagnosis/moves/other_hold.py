@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.search import table
 from actuator_glue.diagnosis.search.conclusion import Conclusion

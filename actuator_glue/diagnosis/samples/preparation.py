@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.scopes.moments import Moment
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene import impulse_removal, slow_channel
 from actuator_glue.hygiene.checks import where

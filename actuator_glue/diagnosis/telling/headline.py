@@ -8,8 +8,8 @@ from typing import Protocol
 
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.learned.term import LearnedTerm
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.scopes.onset import Onset
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.diagnosis.thresholds import LIKELY
 from actuator_glue.diagnosis.verdict.detect import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError

@@ -12,8 +12,8 @@ from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.posterior.mixed_draws import shares
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.scopes.onset import Onset
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
 from actuator_glue.diagnosis.search.table import Row
 from actuator_glue.diagnosis.selection import SearchStep
 from actuator_glue.diagnosis.telling.headline import headline

@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.posterior import agreement
 from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.posterior.answer_posterior import AnswerPosterior, estimates
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.verdict import findings, held_out_reach, rules
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError

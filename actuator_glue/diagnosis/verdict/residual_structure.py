@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.scopes import wrong_setup
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup
+from actuator_glue.diagnosis.scopes import hold_and_stiffness
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -166,7 +166,7 @@ def residual_structure(
     matters = settings.material(2.0 * noise if short else noise, stroke)
     setup = None
     if left >= matters:
-        setup = wrong_setup.find(data, settings)
+        setup = hold_and_stiffness.find(data, settings)
     return ResidualStructure(
         structure_m=left,
         noise_m=noise,

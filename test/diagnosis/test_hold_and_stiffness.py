@@ -9,7 +9,7 @@ from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.pipeline import conclude
 from actuator_glue.diagnosis.samples.preparation import prepare
-from actuator_glue.diagnosis.scopes.wrong_setup import WrongSetup, find
+from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup, find
 from actuator_glue.diagnosis.search.table import LINEAR
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.structure import Structure

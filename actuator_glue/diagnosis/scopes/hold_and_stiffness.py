@@ -1,4 +1,4 @@
-"""Whether records were made under another set-up than was given with them.
+"""The hold and the stiffnesses that were given, and whether others explain the records far better.
 
 Stiffnesses that were given to the wrong records, or the wrong hold of the command between its
 samples, look like a machine that is far from Eq. (2). Where Eq. (2) explains far more under
