@@ -1,6 +1,8 @@
 """Stiffnesses given to the wrong records, and the wrong hold, are told before all else."""
 
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,3 +104,18 @@ def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
     assert found.summary().startswith('check the set-ups: with specimen stiffnesses exchanged')
     assert not found.complete and not found.effects
     assert found.error.after > 1.5 * found.error.noise_floor
+
+
+def test_a_hold_that_was_not_given_is_held_against_an_effect_under_the_given_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A gain that drifts: linear commands alone explain most of it, and noise hides the rest."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / 'benchmarks' / 'blind'))
+    case = import_module('far').build(99043)
+    rows = zip(case.commands, case.measured, case.stiffness, strict=True)
+    records = [Record(u, y, 1.0 / case.rate, stiffness=k) for u, y, k in rows]
+    other = find(prepare(records[:2], []).fit, Thresholds())
+    assert other is not None and other.runs_linearly and other.enough
+    found = diagnose(records[:2], records[2], settings=Thresholds(evaluations=0))
+    assert found.structure == ('gain-drift',) == tuple(case.effects)
+    assert found.verdict == 'missing-effect' and found.setup is None

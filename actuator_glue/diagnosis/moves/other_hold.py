@@ -36,7 +36,9 @@ def other_hold(first: Conclusion, asking: Asking) -> Conclusion | None:
     """
     prepared, linear = first.prepared, first.prepared.setup is not None
     held_commands = any(r.hold == 'zoh' for r in prepared.fit.recorded)
-    if first.decision.verdict == 'none' or not (linear or held_commands):
+    # Where nothing is missing with a hold that was not given, an effect may explain more with the
+    # one that was.
+    if not (linear or (held_commands and first.decision.verdict != 'none')):
         return None
     other = prepared.with_hold('zoh' if linear else 'linear', None)
     base = Refits(other.fit, ()).base()
