@@ -87,7 +87,8 @@ FAR: Final = 1.5
 # 13 machines it was 2.4 at most.
 PROMISED: Final = 4.0
 # Squared error that a refit removes, over what signatures promise, at most: for the names that
-# came to matter on 16 machines it was 4.0 at most.
+# came to matter on 16 machines it was 4.0 at most. Where none promises any of what remains, they
+# say nothing (`Refits._wanted`).
 UNDERSTATED: Final = 6.0
 # Of the best one's removed error: a tie needs nearly all of it, so a rough refit of a rival that
 # removes less is not worth finishing.

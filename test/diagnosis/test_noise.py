@@ -35,8 +35,8 @@ def test_a_p_value_of_no_structure_is_one_and_of_a_burst_small(rng_seed: int) ->
     still = next(e for e in (rng.standard_normal(N) for _ in range(1000)) if structured(e, 1) == 0)
     burst = still + np.where(np.arange(N) < N // 4, rng.standard_normal(N), 0.0)
     data = Data.whole([Record(np.zeros(N), np.zeros(N), 1.0, stiffness=0.0)])
-    assert p_value(data, still, 1) == 1.0
-    assert p_value(data, burst, 1) == 0.01
+    assert p_value(data, [split(still, 1.0)], 1) == 1.0
+    assert p_value(data, [split(burst, 1.0)], 1) == 0.01
 
 
 def test_whitened_noise_is_white() -> None:

@@ -297,18 +297,14 @@ class Refits:
     def _glances(self) -> Part:
         return stretches(self.data, _SCREENED) or self._whole
 
-    def _signature(self, name: str, part: Part) -> tuple[Array, Array]:
-        """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, M)."""
+    def signature(self, name: str) -> tuple[Array, Array]:
+        """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
         if name not in self._signatures:
             alone, base = self.structure(name), self._tried[frozenset()].theta
             thetas = alone.starts(base, self.scale())
-            seen = signatures(part.data, alone, thetas, base)
+            seen = signatures(self._seen_on(name).data, alone, thetas, base)
             self._signatures[name] = thetas[:, alone.columns(name)], seen
         return self._signatures[name]
-
-    def signature(self, name: str) -> tuple[Array, Array]:
-        """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
-        return self._signature(name, self._seen_on(name))
 
     def signatures(self) -> tuple[Array, Array, Scorer]:
         """Every effect's signatures at all its starting sizes (s, M) [m].
@@ -343,7 +339,7 @@ class Refits:
     def _screen(self, current: Trial, name: str, beside: bool) -> tuple[float, Array]:
         model = self.structure(*current.effects, name)
         part, fit = self._seen_on(name), current.fit
-        sizes, seen = self._signature(name, part)
+        sizes, seen = self.signature(name)
         new = np.zeros(len(model.parameters), dtype=np.bool_)
         new[model.columns(name)] = True
 

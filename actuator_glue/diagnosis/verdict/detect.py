@@ -71,11 +71,10 @@ class StationaryNoise:
         return np.fft.irfft(spectrum, self._whole)[: self.size]
 
 
-def p_value(data: Data, error: Array, seed: int, each: Each = map) -> float:
+def p_value(data: Data, splits: list[Split], seed: int, each: Each = map) -> float:
     """Bootstrap p-value of the structure of all records under stationary noise."""
-    parts = zip(data.split(error), data.periods, strict=True)
-    observed = sum(structured(e, period) for e, period in parts)
-    rows = zip(splits_of(data, error), data.parts, data.periods, strict=True)
+    observed = sum(s.structure**2 for s in splits)
+    rows = zip(splits, data.parts, data.periods, strict=True)
     null = [StationaryNoise(part, at.stop - at.start, period) for part, at, period in rows]
 
     def by_chance(number: int) -> float:
@@ -167,7 +166,7 @@ def alarm_of(
         structured=max([found.structure, *found.removed.values(), *(m.rms for m in seen)]),
         threshold=found.material,
         noise=found.noise,
-        p_value=p_value(data, error, seed, each),
+        p_value=p_value(data, splits_of(data, error), seed, each),
         false_alarms=level,
         nats=found.nats,
         tests=statistics(data, error),

@@ -15,7 +15,7 @@ from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.model.exact import Initial
 
 _LENGTH = 5.0  # s of a stretch, its settling not counted
-TOTAL = 60.0  # s of all stretches
+_TOTAL = 60.0  # s of all stretches
 _LONG = 2.0  # times as much as them: shorter records are taken whole
 
 
@@ -34,7 +34,7 @@ class Part:
     records: tuple[int, ...]
 
 
-def stretches(data: Data, most: float = TOTAL) -> Part | None:
+def stretches(data: Data, most: float = _TOTAL) -> Part | None:
     """Return stretches that stand for long records; None where the records are not long.
 
     Args:
