@@ -394,8 +394,7 @@ def diagnose(
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     told = doubts(found, every) if found.complete else suspicions(every)
     values['advice'] = (*told, *found.advice)
-    if told and found.complete:
-        values['verdict'] = 'unexplained'
+    values['doubts'] = told if found.complete else ()
     values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance(every, options.seed)
     return Diagnosis(

@@ -67,16 +67,17 @@ def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = 
         records: what was diagnosed.
         apply: whether the estimator is to carry it; None for what the loop's settings say.
     """
-    left_open = found.verdict in _OPEN or any(
+    open_ = found.verdict in _OPEN or bool(found.doubts)
+    left_open = open_ or any(
         effect.alternatives for effect in found.effects if carriable((effect.name,))
     )
     why_not = against(found.verdict, found.effects, found.structure, found.error)
-    if found.verdict == 'none':
+    if found.verdict == 'none' and not found.doubts:
         return Concluded(Proposal.of(choose_model()), '', left_open, apply, frozenset())
     supported = frozenset(found.structure)
     if found.structure and not carriable(found.structure):
         # The level is settled, whichever of its names is the cause.
-        return Concluded(None, _LEVEL, found.verdict in _OPEN, apply, supported)
+        return Concluded(None, _LEVEL, open_, apply, supported)
     learned = ', '.join(term.name for term in found.learned)
     if learned and not why_not:
         why_not = f'{learned} was learned from these records: no effect of the catalogue'

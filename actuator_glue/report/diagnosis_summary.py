@@ -76,6 +76,8 @@ def _names(found: DiagnosisData) -> list[Block]:
 
 def _meaning(found: DiagnosisData) -> str:
     """Return what the verdict means, in a sentence."""
+    if found.doubts:
+        return 'In doubt, for what is told first; the rest is what the records say by themselves.'
     if found.verdict == 'missing-effect' and all(e.noise is not None for e in found.effects):
         return 'The model is enough for what moves; what is named below is in what measures it.'
     return _MEANS[found.verdict]
@@ -85,6 +87,8 @@ def certainty(found: DiagnosisData) -> str:
     """Return how sure the answer is: one number, and what it is a number of."""
     inside = f'{100 * found.coverage[1]:.0f} % of what was held out lies in the 95 % band'
     named = [e for e in found.effects if math.isfinite(e.probability)]
+    if found.doubts:
+        return f'{inside}, and the answer is in doubt'
     if not found.complete:
         return f'{inside}, and the answer is not complete: intervals are too narrow'
     if not named:

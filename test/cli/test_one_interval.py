@@ -111,11 +111,17 @@ def test_a_channel_that_is_constant_at_rest_has_no_large_noise(tmp_path: Path) -
     write(tmp_path / 'rough.csv', record)
     line = ['calibrate', str(tmp_path / 'rough.csv'), '--stiffness', '0']
     assert main([*line, '--evaluations', '16000']) == 1
-    # So it is in a diagnosis, which else would find the model enough.
+    # So it is in a diagnosis, which by itself finds the model enough: both are told, doubts first.
     judged = ag.diagnose(record, effort=0.05, jobs=1)
-    assert judged.verdict == 'unexplained' and not judged.complete
-    assert 'are taken for noise' in judged.advice[0]
-    assert judged.summary().startswith('the model is not enough')
+    assert judged.verdict == 'none' and not judged.complete
+    (doubt,) = judged.doubts
+    assert 'are taken for noise' in doubt and judged.advice[0] == doubt
+    line = judged.summary()
+    assert line.startswith(f'not to be used as it stands: {doubt}; the model is enough: held-out')
+    told = judged.to_json()
+    assert told['doubts'] == [doubt] and told['summary'] == line and told['complete'] is False
+    text = str(judged)
+    assert 'In doubt, for what is told first' in text and 'intervals are too narrow' not in text
 
 
 def test_an_answer_is_not_more_sure_than_its_numbers() -> None:
@@ -124,7 +130,11 @@ def test_an_answer_is_not_more_sure_than_its_numbers() -> None:
     assert len(record) == 2000
     found = ag.diagnose(record, effort=0.05, jobs=1)
     assert found.verdict == 'none' and 0.9 < found.coverage[1] <= 1.0
-    assert doubts(found, [record]) == ()
+    assert doubts(found, [record]) == () and found.doubts == () and found.complete
+    # What remains is compared with the limit that the verdict is made with.
+    sizes = r'([\d.]+) um of structure are less than a model may leave \(([\d.]+) um\)'
+    for left, limit in re.findall(sizes, ' '.join(found.advice)):
+        assert float(left) < float(limit)
     (told,) = doubts(replace(found, coverage=(0.5, 0.75)), [record])
     assert told.startswith('75 % of what was held out lies in the 95 % band')
     (told,) = doubts(replace(found, rhat=1.4), [record])

@@ -14,7 +14,6 @@ from actuator_glue.diagnosis.thresholds import POINTING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit
-from actuator_glue.inference.noise import whiten
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -199,7 +198,7 @@ def _regressed(
     table: dict[str, NDArray[np.float32]] = {}
     for i, name, feature in library(data, theta):
         row = table.setdefault(name, np.empty(len(error), dtype=np.float32))
-        row[data.parts[i]] = whiten(feature, scorer.taps[i])
+        row[data.parts[i]] = scorer.whiten_record(i, feature)
     known = np.vstack([np.linalg.qr(own.T)[0].T, error])
     gram, cross = _products(list(table.values()), known)
     names, start = list(table), np.diag(gram).copy()

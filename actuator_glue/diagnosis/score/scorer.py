@@ -74,6 +74,14 @@ class Scorer:
                 found[:, run] = whiten(table[:, run], taps)
         return out
 
+    def whiten_record(self, record: int, samples: Array) -> Array:
+        """Whiten the counted samples (..., n) of one record, as `whiten` does those of all."""
+        out, start = np.empty_like(samples), self.data.parts[record].start
+        for _, run in self.data.runs[record]:
+            own = slice(run.start - start, run.stop - start)
+            out[..., own] = whiten(samples[..., own], self.taps[record])
+        return out
+
     def block_scores(self, fit: Fit) -> Array:
         """Log density of each block under parameters fitted without it (B,), up to a constant."""
         if fit not in self._known:

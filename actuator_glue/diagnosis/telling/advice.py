@@ -115,10 +115,10 @@ def of(
                 else 'it follows no simple function of the motion, at no one place in the loop'
             )
         )
-    if decision.verdict == 'none' and found.structure > 0.0:
+    if decision.verdict == 'none' and decision.left > 0.0:
         out.append(
-            f'structure of {1e6 * found.structure:.1f} um is immaterial '
-            f'(threshold {1e6 * found.material:.1f} um)'
+            f'{1e6 * decision.left:.1f} um of structure are less than a model may leave '
+            f'({1e6 * decision.limit:.1f} um)'
         )
     return tuple(out)
 

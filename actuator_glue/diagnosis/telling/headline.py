@@ -62,6 +62,11 @@ class Told(Protocol):
         """Another set-up that explains the records far better; None for none."""
         ...
 
+    @property
+    def doubts(self) -> Sequence[str]:
+        """Why the answer must not be used as it stands."""
+        ...
+
 
 def _named(effect: Finding, found: Told) -> str:
     equations = [term.numbers for term in found.learned if term.name == effect.name]
@@ -114,11 +119,14 @@ def _errors(found: Told, named: bool) -> str:
 def headline(found: Told) -> str:
     """Return the verdict in one line, never more than the held-out part confirms.
 
-    A wrong set-up is reported first.
+    Doubts, and a wrong set-up, are reported first.
     """
+    parts = [_verdict(found)]
     if found.setup is not None:
-        return f'{found.setup.sentence()}; {_verdict(found)}'
-    return _verdict(found)
+        parts.insert(0, found.setup.sentence())
+    if found.doubts:
+        parts.insert(0, f'not to be used as it stands: {"; ".join(found.doubts)}')
+    return '; '.join(parts)
 
 
 def _verdict(found: Told) -> str:

@@ -30,14 +30,14 @@ def remaining(data: Data, decision: Decision) -> Json:
     error, rows = decision.final.fit.error, []
     splits, errors = splits_of(data, error), data.split(error)
     outputs = data.split(data.target - error)
-    for i, (record, part, e, y, t, period) in enumerate(
-        zip(data.records, splits, errors, outputs, data.times, data.periods, strict=True)
+    speeds = data.split(np.abs(data.velocity(data.target - error)))
+    for i, (record, part, e, y, velocity, t) in enumerate(
+        zip(data.records, splits, errors, outputs, speeds, data.times, strict=True)
     ):
         excess = np.maximum(e**2 - part.noise**2, 0.0)
         total = float(excess.sum()) or 1.0
         cumulated = np.cumsum(excess)
         inner = np.searchsorted(cumulated, [0.1 * cumulated[-1], 0.9 * cumulated[-1]])
-        velocity = np.abs(np.gradient(y, period))
         slow = velocity < np.median(velocity)
         amplitude = np.abs(y - np.median(y))
         large = amplitude > np.median(amplitude)

@@ -80,6 +80,8 @@ class DiagnosisData:
             first.
         history: the steps that led to the answer, in order; the last one is the answer.
         effort: share of the effort that the search spent; at 1 and more it ended early.
+        doubts: why an answer that explains the records must not be used as it stands, a sentence
+            each: in the records themselves, in coverage, in the chains.
     """
 
     verdict: Verdict
@@ -113,6 +115,7 @@ class DiagnosisData:
     structures: tuple[Row, ...] = ()
     history: tuple[SearchStep, ...] = ()
     effort: float = 0.0
+    doubts: tuple[str, ...] = ()
     sampler: Json = field(default_factory=dict)
     which: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     mixture: tuple[tuple[str, ...], ...] = ()
@@ -125,6 +128,7 @@ class DiagnosisData:
             'verdict': self.verdict,
             'summary': self.summary(),
             'complete': self.complete,
+            'doubts': list(self.doubts),
             'effects': [e.to_json() for e in self.effects],
             'error': self.error.to_json(),
             'searched': [name for name, entry in CATALOGUE.items() if entry.searched],
@@ -173,8 +177,8 @@ class DiagnosisData:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing material remains, on the fitting and on the held-out part."""
-        return self.verdict in COMPLETE
+        """Whether nothing material remains, in either part, and nothing speaks against that."""
+        return self.verdict in COMPLETE and not self.doubts
 
     def summary(self) -> str:
         """Return the verdict in one line."""

@@ -96,11 +96,10 @@ def ljung_box(error: Array) -> float:
     return float(scipy.stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - lags)), _LAGS))
 
 
-def _even_odd(error: Array, output: Array) -> tuple[float, float]:
+def _even_odd(error: Array, output: Array, velocity: Array) -> tuple[float, float]:
     """Shares of the error explained by even and by odd powers of displacement and velocity."""
     x = output / max(float(np.abs(output).max()), 1e-12)
-    v = np.gradient(output)
-    v = v / max(float(np.abs(v).max()), 1e-30)
+    v = velocity / max(float(np.abs(velocity).max()), 1e-30)
     even = np.stack([x**2, v**2, x * v, np.abs(x), np.abs(v), np.ones_like(x)])
     odd = np.stack([x**3, v**3, x**2 * v, x * v**2, np.sign(v), x * np.abs(x), v * np.abs(v)])
     shares = []
@@ -129,11 +128,12 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
         data.masks,
         data.split(error),
         data.split(data.target - error),
+        data.split(data.velocity(data.target - error)),
         data.times,
         data.periods,
         strict=True,
     )
-    for record, mask, e, y, t, period in rows:
+    for record, mask, e, y, v, t, period in rows:
         out['ljung_box_p'] = min(out['ljung_box_p'], ljung_box(e))
         u = record.command[mask] - record.command[mask].mean()
         lags = round(0.5 / period)
@@ -141,7 +141,7 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
         near = cross[len(e) // 2 - lags : len(e) // 2 + lags + 1]
         norm = float(np.sqrt(((e - e.mean()) ** 2).sum() * (u**2).sum())) or 1.0
         out['input_correlation'] = max(out['input_correlation'], float(np.abs(near).max()) / norm)
-        even, odd = _even_odd(e, y)
+        even, odd = _even_odd(e, y, v)
         out['even_share'] = max(out['even_share'], even)
         out['odd_share'] = max(out['odd_share'], odd)
         slope = float(np.polyfit(t, e, 1)[0])

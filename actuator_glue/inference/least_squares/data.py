@@ -171,6 +171,18 @@ class Data:
             slice(int(e) - int(m.sum()), int(e)) for e, m in zip(ends, self.masks, strict=True)
         )
 
+    def velocity(self, motion: Array) -> Array:
+        """Return the derivative of joined counted samples (N,) by time [1/s], run by run.
+
+        Zero in runs of a single sample.
+        """
+        out = np.zeros_like(motion)
+        for runs, period in zip(self.runs, self.periods, strict=True):
+            for _, run in runs:
+                if run.stop - run.start > 1:
+                    out[run] = np.gradient(motion[run], period)
+        return out
+
     @cached_property
     def runs(self) -> tuple[list[tuple[slice, slice]], ...]:
         """Where each record's counted samples lie, run by run, and where in the joined vectors.
