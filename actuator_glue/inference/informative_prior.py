@@ -40,6 +40,7 @@ class InformativePrior:
         transform: from its parameters to the coordinates of the mixture.
         mixture: the density of the coordinates.
         carried: the draws it was made from.
+        undrifted: the density before drift and doubt widened it.
     """
 
     names: tuple[str, ...]
@@ -47,15 +48,17 @@ class InformativePrior:
     transform: Transform
     mixture: Mixture
     carried: Carried
+    undrifted: Mixture
 
     def quality(self) -> float:
-        """Return the energy coefficient between the draws and the mixture.
+        """Return the energy coefficient between the draws and the mixture fitted to them.
 
-        0 for equal distributions, at most 1 (Szekely and Rizzo 2013).
+        0 for equal distributions, at most 1 (Szekely and Rizzo 2013). What drift adds is no fault
+        of the mixture.
         """
         names = self.carried.names
         known = self.carried.draws[:, [names.index(name) for name in self.names]]
-        return _energy(self.transform.forward(np.ascontiguousarray(known)), self.mixture)
+        return _energy(self.transform.forward(np.ascontiguousarray(known)), self.undrifted)
 
     def coordinates(self, x: Array) -> Array:
         """Return the coordinates (m, q) of the model's parameters (m, p)."""
@@ -150,7 +153,7 @@ def _fitted(
     ridged = stiffness is not None and shared[:4] == names[:4] and len(shared) >= 4
     transform = carried_coordinates(shared, low, high, stiffness if ridged else None)
     mixture = fitted(transform.forward(draws), carried.components)
-    return InformativePrior(shared, columns, transform, mixture, carried)
+    return InformativePrior(shared, columns, transform, mixture, carried, mixture)
 
 
 def _walked(mixture: Mixture, transform: Transform, spread: Array) -> Mixture:

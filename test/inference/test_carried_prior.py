@@ -97,6 +97,8 @@ def test_drift_adds_to_the_variance_of_logarithms():
     known = carried()
     later = known.drifted(Drift.of(0.01, {'beta_1': 0.1}), 4 * 3600.0)
     assert np.allclose(later.spread, [0.2, 0.02, 0.02, 0.02])
+    # The mixture is held against the draws as they were: drift makes it no worse a fit.
+    assert prior(later).quality() == prior(known).quality() < 0.01
     again = known.drifted(Drift(0.01), 3600.0).drifted(Drift(0.01), 3 * 3600.0)
     assert np.allclose(again.spread, 0.02)
     for stiffness in (None, 250e3):
