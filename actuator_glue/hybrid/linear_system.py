@@ -30,6 +30,24 @@ class System(NamedTuple):
         inner = np.linalg.solve(matrix, right)[..., 0]
         return np.asarray((inner * self.C[:, None]).sum(axis=2) + self.D[:, None])
 
+    def phase(self, w: Array, response: Complex) -> Array:
+        """Return the phase at angular frequencies with all its turns, (m, k) [rad].
+
+        Continuous from rest up, whatever frequencies are asked for: no grid that a sharp resonance
+        could slip through. From j 0 to j w each pole turns by less than half a turn, which its own
+        angle tells; the sum says by how many turns the angle of the response is short. Exact where
+        zeros turn it by less than half a turn in all, and the static gain is positive: an actuator
+        has no zeros.
+
+        Args:
+            w: angular frequencies, shape (k,) [rad/s].
+            response: what `response` gives there, (m, k).
+        """
+        poles = np.linalg.eigvals(self.A)[:, None]
+        lag = np.angle((1j * w[:, None] - poles) * -poles.conj()).sum(axis=2)
+        angle = np.angle(response)
+        return np.asarray(angle - 2.0 * np.pi * np.rint((angle + lag) / (2.0 * np.pi)))
+
 
 def series(first: System, second: System) -> System:
     """Return the second system fed by the first; one row may meet many."""

@@ -86,10 +86,14 @@ def share(hits: Flags, effective: float, level: float = 0.95) -> Share:
 
 
 def tracking(found: Actuator, frequencies_hz: Sequence[float]) -> Tracking:
-    """Return delay, amplitude and bandwidth (3 dB below static) of linear actuators."""
+    """Return delay, amplitude and bandwidth (3 dB below static) of linear actuators.
+
+    The delay is that of the phase with all its turns: one angle alone tells a lag beyond half a
+    turn as a lead.
+    """
     w = 2.0 * np.pi * np.asarray(frequencies_hz, dtype=np.float64)
     gain = found.system.response(np.broadcast_to(1j * w, (len(found.delay), len(w))))
-    delay = -np.angle(gain) / w + found.delay[:, None]
+    delay = -found.system.phase(w, gain) / w + found.delay[:, None]
     static = found.system.response(np.zeros((len(found.delay), 1), dtype=np.complex128)).real
     scaled = found.system._replace(C=found.system.C * np.sqrt(2.0) / np.abs(static))
     bandwidth = np.nanmin(crossings(scaled), axis=1) / (2.0 * np.pi)

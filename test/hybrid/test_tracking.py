@@ -10,7 +10,10 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.api.diagnosis import _tracking
 from actuator_glue.api.tracking import record_tracking, records_tracking
+from actuator_glue.hybrid.actuator import actuator
 from actuator_glue.hybrid.indicators import TargetMotion, lag_by_blocks
+from actuator_glue.hybrid.stability import tracking
+from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure
 
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
@@ -126,3 +129,35 @@ def test_the_lag_of_a_long_test_is_found_block_by_block(lag: int) -> None:
     moved = np.roll(target, lag) + 0.01 * rng.standard_normal(len(target))
     assert lag_by_blocks(target, moved, 512) == lag
     assert TargetMotion(target, 1.0).criteria(moved).j1 == lag
+
+
+# Effects, their parameters and the specimen's stiffness [N/m]: lags beyond half a turn within
+# 50 Hz, and a payload on a light damper that turns by half of one within a fraction of a hertz.
+LATE = [
+    (('valve-lag',), (0.015,), 250e3),
+    (('delay',), (0.06,), 250e3),
+    (('delay', 'valve-lag', 'sensor-lag'), (0.03, 0.004, 0.01), 0.0),
+    (('payload-inertia',), (300.0, 3.0), 2e6),
+]
+
+
+@pytest.mark.parametrize(('effects', 'values', 'stiffness'), LATE)
+def test_a_lag_beyond_half_a_turn_is_no_lead(
+    effects: tuple[str, ...], values: tuple[float, ...], stiffness: float
+) -> None:
+    """Few frequencies are told the delay that a fine grid from rest up tells."""
+    structure, asked = Structure(effects), (5.0, 20.0, 50.0)
+    draws = np.array([[*TABLE_2, *values]])
+    draws = draws * np.exp(1e-3 * np.random.default_rng(0).standard_normal((20, draws.shape[1])))
+    made = actuator(draws, structure.names, structure.entries, np.full(20, stiffness))
+    hertz = np.arange(1, 5001) * 0.01
+    s = np.broadcast_to(2j * np.pi * hertz, (20, len(hertz)))
+    at = np.searchsorted(hertz, np.array(asked) - 1e-6)
+
+    def true(system: object) -> np.ndarray:
+        response = system.response(s) * np.exp(-s * made.delay[:, None])
+        return -np.unwrap(np.angle(response), axis=1)[:, at] / (2.0 * np.pi * np.array(asked))
+
+    expected = true(made.system)
+    assert (expected * asked > 0.5).any()
+    np.testing.assert_allclose(tracking(made, asked).delay, expected, atol=1e-9)
