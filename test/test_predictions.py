@@ -12,6 +12,7 @@ import scipy
 import actuator_glue as ag
 from actuator_glue.api.frequency_response import measured_response, recorded_response
 from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.model.structure import Structure
 
 RATE, STIFF = 200.0, 250e3
 
@@ -133,6 +134,20 @@ def test_what_was_measured_lies_on_the_response(posterior: ag.Calibration, hold:
     still = replace(record, measured=np.random.default_rng(1).normal(size=len(record)) * 1e-5)
     with pytest.raises(ag.InputError, match='at no frequency'):
         measured_response(still)
+
+
+def test_what_was_measured_of_a_late_actuator_has_the_turns_of_the_model() -> None:
+    """Of a record that excites nothing below 8 Hz, where the actuator lags by more than 180."""
+    theta = {'delay': {'delay': 0.03}}
+    shape = ag.Command('noise', rate=RATE, duration=20.0, low=8.0, high=14.0)
+    record = ag.simulate(shape, stiffness=STIFF, effects=theta, seed=(11, 9))
+    draws = np.tile([*TABLE_2, 0.03], (3, 1))
+    found = recorded_response(draws, Structure(['delay']).names, Structure(['delay']), record)
+    seen = found.measured
+    assert seen is not None and seen.frequency[0] > 6.0
+    assert found.phase.median[0] < -180.0
+    phase = np.interp(seen.frequency, found.frequency, found.phase.median)
+    assert np.abs(seen.phase - phase).max() < 10.0
 
 
 def test_a_bode_plot_shows_what_was_measured(posterior: ag.Calibration, tmp_path: Path) -> None:

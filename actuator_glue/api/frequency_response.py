@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.actuator import actuator, table_of
-from actuator_glue.hybrid.linear_system import Complex
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -49,7 +48,7 @@ class FrequencyResponse:
     Attributes:
         frequency: shape (f,) [Hz].
         gain: displacement over command [1].
-        phase: lead of the displacement [degrees].
+        phase: lead of the displacement with all its turns from 0 Hz on [degrees].
         delay: -phase over angular frequency [s].
         stiffness: of the specimen [N/m].
         left_out: effects of the model that no linear response has.
@@ -95,8 +94,8 @@ def frequency_response(
         InputError: frequencies that are not positive.
     """
     hertz = _positive(np.geomspace(*DEFAULT) if frequencies is None else frequencies)
-    response = _response(draws, names, structure, stiffness, hertz)
-    return _limits(response, hertz, structure, stiffness)
+    gain, phase = _response(draws, names, structure, stiffness, hertz)
+    return _limits(gain, phase, hertz, structure, stiffness)
 
 
 def recorded_response(
@@ -126,11 +125,21 @@ def recorded_response(
         frequencies = np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2])
     hertz = _positive(frequencies)
     stiffness = record.known_stiffness()
-    held = np.sinc(hertz * record.period) ** (2 if record.hold == 'linear' else 1)
-    if record.hold == 'zoh':
-        held = held * np.exp(-1j * np.pi * hertz * record.period)
-    response = _response(draws, names, structure, stiffness, hertz) * held
-    return _limits(response, hertz, structure, stiffness, measured)
+
+    def expected(at: Array) -> tuple[Array, Array]:
+        held = np.sinc(at * record.period) ** (2 if record.hold == 'linear' else 1)
+        if record.hold == 'zoh':
+            held = held * np.exp(-1j * np.pi * at * record.period)
+        gain, phase = _response(draws, names, structure, stiffness, at)
+        # A hold turns by less than half a turn at every frequency: its angle is all of it.
+        return gain * np.abs(held), phase + np.angle(held)
+
+    # Turns below its lowest frequency are in no record: they are those of the model.
+    lowest = float(np.median(np.degrees(expected(measured.frequency[:1])[1])))
+    turns = np.rint((lowest - measured.phase[0]) / 360.0)
+    measured = measured._replace(phase=measured.phase + 360.0 * turns)
+    gain, phase = expected(hertz)
+    return _limits(gain, phase, hertz, structure, stiffness, measured)
 
 
 def _positive(frequencies: ArrayLike) -> Array:
@@ -142,31 +151,31 @@ def _positive(frequencies: ArrayLike) -> Array:
 
 def _response(
     draws: Array, names: Sequence[str], structure: Structure, stiffness: float, hertz: Array
-) -> Complex:
-    """Return what the recording transducer shows over the command, (m, f)."""
+) -> tuple[Array, Array]:
+    """Return gain and phase [rad] of what the recording transducer shows, (m, f) each."""
     table = table_of(draws, names, structure)
     linear = actuator(
         table, structure.names, structure.entries, np.full(len(table), float(stiffness))
     )
-    s = np.broadcast_to(2j * np.pi * hertz, (len(table), len(hertz)))
+    w = 2.0 * np.pi * hertz
     seen = np.broadcast_to(linear.shown, linear.system.C.shape)
-    answer = linear.system._replace(C=seen).response(s)
-    return np.asarray(answer * np.exp(-s * linear.delay[:, None]))
+    recorded = linear.system._replace(C=seen)
+    answer = recorded.response(np.broadcast_to(1j * w, (len(table), len(w))))
+    # A delay turns by what it is: its angle alone, of one frequency, would hide whole turns.
+    return np.abs(answer), recorded.phase(w, answer) - w * linear.delay[:, None]
 
 
 def _limits(
-    response: Complex,
+    gain: Array,
+    phase: Array,
     hertz: Array,
     structure: Structure,
     stiffness: float,
     measured: MeasuredResponse | None = None,
 ) -> FrequencyResponse:
-    phase = np.unwrap(np.angle(response), axis=1)
-    # No actuator leads its command by half a turn at the lowest frequency.
-    phase -= 2.0 * np.pi * np.rint(phase[:, :1] / (2.0 * np.pi))
     return FrequencyResponse(
         frequency=hertz,
-        gain=_over_draws(np.abs(response)),
+        gain=_over_draws(gain),
         phase=_over_draws(np.degrees(phase)),
         delay=_over_draws(-phase / (2.0 * np.pi * hertz)),
         stiffness=float(stiffness),
@@ -182,6 +191,8 @@ def _over_draws(values: Array) -> Limits:
 
 def measured_response(record: Record) -> MeasuredResponse:
     """Return gain and phase [degrees] of a record at the frequencies that its command excited.
+
+    The phase is within half a turn at the lowest of them, and goes on from there.
 
     Raises:
         InputError: the displacement follows the command at no frequency.

@@ -9,6 +9,8 @@ import pytest
 
 import actuator_glue as ag
 from actuator_glue.api.diagnosis import _tracking
+from actuator_glue.api.frequency_response import frequency_response
+from actuator_glue.api.hybrid_meaning import hybrid_meaning
 from actuator_glue.api.tracking import record_tracking, records_tracking
 from actuator_glue.hybrid.actuator import actuator
 from actuator_glue.hybrid.indicators import TargetMotion, lag_by_blocks
@@ -161,3 +163,26 @@ def test_a_lag_beyond_half_a_turn_is_no_lead(
     expected = true(made.system)
     assert (expected * asked > 0.5).any()
     np.testing.assert_allclose(tracking(made, asked).delay, expected, atol=1e-9)
+    recorded = made.system._replace(C=np.broadcast_to(made.shown, made.system.C.shape))
+    expected = np.median(true(recorded), axis=0)
+    for i, f in enumerate(asked):
+        one = frequency_response(draws, structure.names, structure, stiffness, [f])
+        assert one.delay.median[0] == pytest.approx(expected[i], abs=1e-9)
+        assert one.phase.median[0] == pytest.approx(-360.0 * f * expected[i], abs=1e-6)
+
+
+def test_what_a_late_actuator_means_for_a_test_at_10_hz() -> None:
+    """Half a turn is 50 ms there; an actuator of 51 ms does not lead by 49."""
+    stiffness, w = 250e3, 2.0 * np.pi * 10.0
+    partition = ag.Partition(
+        mass=1000.0,
+        damping=2.0 * 0.05 * 1000.0 * w,
+        stiffness=1000.0 * w**2 - stiffness,
+        specimen=ag.Specimen(0.0, 0.0, stiffness),
+        rate=1000.0,
+    )
+    structure, draws = Structure(['delay']), np.tile([*TABLE_2, 0.0225], (4, 1))
+    told = hybrid_meaning(
+        partition, lambda k, f: frequency_response(draws, structure.names, structure, k, [f]).delay
+    )
+    assert 'at 10 Hz the actuator lags by 51.17 ms (51.17 to 51.17)' in told
