@@ -164,6 +164,23 @@ class TargetMotion:
         return float(lost / whole) if whole > 0.0 else 0.0
 
 
+def largest_lag(target: Array, measured: Array) -> int:
+    """Return the lag of the largest cross-correlation in samples.
+
+    Args:
+        target: displacement asked for, (n,) [m].
+        measured: displacement reached, (n,) [m].
+    """
+    n = len(target)
+    if n > _LONG:
+        return lag_by_blocks(target, measured)
+    size = next_fast_len(2 * n - 1, real=True)
+    found = irfft(rfft(measured, size) * rfft(target, size).conj(), size)
+    # Lags below zero stand at the end.
+    lag = int(np.argmax(found))
+    return lag if lag < n else lag - size
+
+
 def lag_by_blocks(target: Array, measured: Array, most: int = 1 << 17) -> int:
     """Return the lag of the largest cross-correlation in samples, one block after the other.
 

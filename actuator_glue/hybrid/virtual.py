@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from actuator_glue.hybrid import adaptation, virtual_kernel
 from actuator_glue.hybrid.actuator import actuator, nonlinear, table_of
 from actuator_glue.hybrid.compensator import Compensator
+from actuator_glue.hybrid.indicators import largest_lag
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.hybrid.sampled import Plants, numerical, plants, reference
 from actuator_glue.hybrid.virtual_kernel import LANES
@@ -23,6 +24,7 @@ from actuator_glue.records import Array
 # A draw whose floors move this much further than the reference's has left every test behind.
 DIVERGED = 5.0
 _SLOWEST = 0.05  # Hz, of a structure that adapts a compensator
+_ENOUGH = 1000.0  # Hz, ten samples a period of whatever a structure or a piston does
 _KEPT = 8000  # numbers of the response that are kept of each draw
 
 
@@ -215,10 +217,32 @@ def joined(parts: Iterable[Responses]) -> Responses:
     return Responses(*every)
 
 
+def lags(target: Array, moved: Array, period: float) -> Array:
+    """Return the lag of the largest cross-correlation of each row, (m,) [samples].
+
+    That of J1 (`TargetMotion.criteria`) at a part of its time: the summit is looked for among all
+    lags in every few samples, and climbed to in all of them. A climb from no lag would stop on the
+    way where a structure has several frequencies, or leap over a period where its steps are long.
+
+    Args:
+        target: displacements asked for, (m, n) [m].
+        moved: displacements reached, (m, n) [m].
+        period: between samples [s].
+
+    Returns:
+        NaN for rows that are not finite.
+    """
+    every = max(1, int(1.0 / (_ENOUGH * period)))
+    found = np.full(len(target), np.nan)
+    for row in np.flatnonzero(np.isfinite(target).all(axis=1) & np.isfinite(moved).all(axis=1)):
+        found[row] = every * largest_lag(target[row, ::every], moved[row, ::every])
+    virtual_kernel.climb(target, moved, every // 2, found)
+    return found
+
+
 @np.errstate(all='ignore')  # what diverges is no number in the end
 def _summary(found: Found, count: int, period: float) -> Responses:
-    lag = np.empty(LANES)
-    virtual_kernel.lags(found.target, found.moved, lag)
+    lag = lags(found.target, found.moved, period)
     error = found.moved - found.target
     j2 = np.sqrt((error**2).mean(axis=1) / (found.target**2).mean(axis=1))
     j3 = np.abs(error).max(axis=1) / np.abs(found.target).max(axis=1)

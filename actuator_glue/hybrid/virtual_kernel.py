@@ -251,23 +251,30 @@ def run_effects(
 
 
 @njit(nogil=True)
-def lags(target: Array, moved: Array, out: Array) -> None:
-    """Write the lag of the largest cross-correlation of each row, (m,) [samples].
+def climb(target: Array, moved: Array, step: int, lags: Array) -> None:
+    """Move the lag of each row, (m,) [samples], up its cross-correlation to the next summit.
 
-    Climbed from no lag with ever smaller steps: the correlation of two displacements that follow
-    one another has one summit within half a period of the structure.
+    Args:
+        target: displacements asked for, (m, n) [m].
+        moved: displacements reached, (m, n) [m].
+        step: samples of the first step, which halve down to one; 0 leaves the lags as they are.
+            Longer ones than a quarter of the shortest period leap to another summit.
+        lags: where to begin, and what is found; NaN stays.
     """
     for row in range(len(target)):
-        best, height, step = 0, _correlation(target[row], moved[row], 0), 64
-        while step > 0:
+        if np.isnan(lags[row]):
+            continue
+        best, reach = int(lags[row]), step
+        height = _correlation(target[row], moved[row], best)
+        while reach > 0:
             while True:
-                up = _correlation(target[row], moved[row], best + step)
-                down = _correlation(target[row], moved[row], best - step)
+                up = _correlation(target[row], moved[row], best + reach)
+                down = _correlation(target[row], moved[row], best - reach)
                 if not max(up, down) > height:
                     break
-                best, height = (best + step, up) if up > down else (best - step, down)
-            step //= 4
-        out[row] = best
+                best, height = (best + reach, up) if up > down else (best - reach, down)
+            reach //= 2
+        lags[row] = best
 
 
 @njit

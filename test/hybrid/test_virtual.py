@@ -16,7 +16,7 @@ from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.design import Loop, compensator_of
 from actuator_glue.hybrid.ground_motion import artificial
 from actuator_glue.hybrid.indicators import TargetMotion
-from actuator_glue.hybrid.virtual import Responses, VirtualTest
+from actuator_glue.hybrid.virtual import Responses, VirtualTest, lags
 from actuator_glue.io.partition import read_partition
 from actuator_glue.model import linear
 
@@ -152,6 +152,28 @@ def test_criteria_are_those_of_the_indicators(benchmark_draws: Made) -> None:
         j1, j2, j3 = TargetMotion(whole.target[i], partition.period).criteria(whole.moved[i])
         assert (found.j1[i], found.j2[i], found.j3[i]) == pytest.approx((j1, j2, j3), rel=1e-9)
     assert found.j1.min() > 1e-3
+
+
+@pytest.mark.parametrize('rate', [100.0, 256.0, 1024.0, 5000.0])
+def test_j1_of_fast_structures_at_slow_rates(rate: float) -> None:
+    """The lag of structures of 1, 8, and of 1 and 8 Hz: a climb in long steps leaps periods."""
+    rng = np.random.default_rng(0)
+    period, late = 1.0 / rate, np.round(rate * np.array([0.0, 0.02, 0.04, 0.08])).astype(int)
+    n, before = round(20.0 * rate), late.max()
+    noise, motion = rng.standard_normal(n + before), {}
+    for hertz in (1.0, 8.0):
+        root = np.exp(2.0 * np.pi * hertz * period * (-0.03 + 1j))
+        x = signal.lfilter([1.0], [1.0, -2.0 * root.real, abs(root) ** 2], noise)
+        # At rest at both ends: no sample is in one row alone.
+        motion[hertz] = x / x.std() * np.pad(np.hanning(n - before), before)
+    for x in (motion[1.0], motion[8.0], motion[1.0] + 0.5 * motion[8.0]):
+        target = np.tile(x[before:], (len(late), 1))
+        moved = np.array([x[before - k : before - k + n] for k in late])
+        for row, found in zip(moved, lags(target, moved, period), strict=True):
+            assert found == round(TargetMotion(target[0], period).criteria(row).j1 * rate)
+        assert lags(target, moved, period).tolist() == late.tolist()
+    moved[1, 5] = np.nan
+    assert np.isnan(lags(target, moved, period)).tolist() == [False, True, False, False]
 
 
 @pytest.mark.parametrize('case', range(1, 5))
