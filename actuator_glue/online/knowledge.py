@@ -104,7 +104,8 @@ class Knowledge:
             return drifted.later((window.record.start_ns - known.middle_ns) * 1e-9)
         if self._first is None:
             return None
-        elapsed = (middle - (self.began_ns or start)) * 1e-9
+        began = start if self.began_ns is None else self.began_ns
+        elapsed = (middle - began) * 1e-9
         return self._first.drifted(self._drift, self._settings.prior_age + elapsed)
 
     def learn(

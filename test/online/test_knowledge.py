@@ -15,10 +15,11 @@ from actuator_glue.model.parameters import NAMES
 from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.playback import replay
 from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Contradicted
+from actuator_glue.online.stream import Contradicted, Window
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
@@ -186,6 +187,25 @@ def test_a_first_window_without_a_posterior_changes_no_later_prior():
     assert len(once) == len(twice) > 5
     for one, other in zip(once, twice, strict=True):
         assert one.moments.mean.tobytes() == other.moments.mean.tobytes()
+
+
+def window(number, start_ns, segment=1):
+    """A window of five seconds, one a second."""
+    still = np.zeros(500)
+    of = Record(still, still, 0.01, 250e3, start_ns=start_ns, first_index=100 * number)
+    return Window(number, of, 1, segment, of)
+
+
+@pytest.mark.parametrize('first_ns', [0, 1, 10**18])
+def test_a_prior_drifts_from_the_first_stamp_on(first_ns):
+    """Also where the clock of the laboratory began with the test."""
+    knowledge = Knowledge(replace(CALIBRATION, drift=0.02, settle=0.0), known())
+    spread = []
+    for hours in (0, 1, 4):
+        at = window(3600 * hours, first_ns + hours * 3600 * 10**9)
+        knowledge.formed(at)
+        spread.append(knowledge.prior(at).spread[0])
+    assert spread == pytest.approx([0.0, 0.02, 0.04], abs=1e-3)
 
 
 def test_memory_is_bounded():
