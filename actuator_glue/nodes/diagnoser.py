@@ -28,7 +28,7 @@ from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion
 from actuator_glue.online import when_to_diagnose as live
 from actuator_glue.online.collect import Collector
-from actuator_glue.online.memory import Memory, looked_at
+from actuator_glue.online.memory import Memory, earliest, looked_at
 from actuator_glue.online.stream import Event, Rejected, Restarted
 from actuator_glue.online.structures import Proposal
 from actuator_glue.setups import from_message
@@ -214,7 +214,7 @@ class DiagnoserNode(WorkingNode):
             streamed = () if handle.request.records else tuple(self.collector.records())
             request = diagnoser_worker.asked(handle.request, streamed)
             if streamed:
-                request = replace(request, known=self.memory.before(streamed[0].start_ns))
+                request = replace(request, known=self.memory.before(earliest(streamed)))
             self._take(live.Requested(bool(streamed)))
             self._start(request)
         except InputError as error:

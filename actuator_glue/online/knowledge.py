@@ -53,6 +53,10 @@ class Knowledge:
     sample is counted once along the chain of windows that led there. It belongs to one model:
     posteriors of another model come from a model that was found wanting.
 
+    Stamps tell which windows share samples only while the clock goes on; where it goes back the
+    stream begins another segment, which shares none with those before. Posteriors from before
+    that seem later than its windows, and are no prior of them.
+
     Args:
         settings: of the estimator; `prior` says which prior is wanted.
         carried: draws of the calibration, where there is one.
@@ -77,6 +81,9 @@ class Knowledge:
         # Windows that share samples with the handed posterior do not begin with it.
         self._from_ns = 0 if handed is None else handed.last_ns + 1
         self._epoch: int | None = None
+        self._segment: int | None = None
+        # The last sample of the newest window taken, and of the newest one tested.
+        self._taken_ns: int | None = None
         self._tested_ns: int | None = None
         independent = 3600.0 / max(settings.window - settings.settle, settings.hop)
         self._test = SequentialTest(independent, settings.false_alarms)
@@ -113,6 +120,12 @@ class Knowledge:
     ) -> list[Contradicted]:
         """Take a window's posterior, and how far it contradicts the window's prior."""
         start, middle, last = self._times(window)
+        if self._segment != window.segment:
+            # No sample of another segment: only a clock that went back can make it seem so.
+            self._segment, self._tested_ns = window.segment, None
+            if self._taken_ns is not None and start < self._taken_ns:
+                self._from_ns = 0
+        self._taken_ns = last
         wanted = self._settings.prior == 'sequential' and start >= self._from_ns
         if wanted and posterior is not None:
             there = posterior.later((middle - window.record.start_ns) * 1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 
 from actuator_glue.inference.carried import Carried, Drift
@@ -52,6 +53,9 @@ class Memory:
     def learn(self, known: Known, first_ns: int | None) -> None:
         """Take a posterior that nothing speaks against.
 
+        One that ends before the newest came after the clock went back: the others are of times
+        that say no longer what was earlier, and are dropped.
+
         Args:
             known: the posterior.
             first_ns: when the records that are kept begin [ns]: of posteriors before that, only
@@ -59,13 +63,18 @@ class Memory:
         """
         if self.settings is None or self.settings.prior != 'sequential':
             return
+        if self._known and known.last_ns < self._known[-1].last_ns:
+            self._known.clear()
         if self._known and known.last_ns < self._known[-1].last_ns + 1_000_000_000:
             return
         told = known.carried.names if self._carried is not None else _told(known.carried)
         if not told:
             return
         self._known.append(replace(known, carried=known.carried.only(told)))
-        while first_ns is not None and len(self._known) > 1 and self._known[1].last_ns < first_ns:
+        # Records that seem to begin after it are of before the clock went back.
+        if first_ns is None or first_ns > known.last_ns:
+            return
+        while len(self._known) > 1 and self._known[1].last_ns < first_ns:
             self._known.popleft()
 
     def before(self, first_ns: int) -> tuple[Carried, Drift, float] | None:
@@ -106,4 +115,13 @@ def looked_at(
     The records are those after `since` seconds of data; all where these are too short.
     """
     records = collector.records(since=since) or collector.records()
-    return records, memory.before(records[0].start_ns) if records else None
+    return records, memory.before(earliest(records)) if records else None
+
+
+def earliest(records: Sequence[Record]) -> int:
+    """Return the time before which no sample of records was taken, whatever the clock did [ns].
+
+    The first record need not have it: where the clock went back, those after it seem earlier, and
+    a posterior that seems to precede the first may hold their samples.
+    """
+    return min(record.start_ns for record in records)

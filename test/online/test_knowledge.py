@@ -11,11 +11,12 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.posterior import Problem, sample
+from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
-from actuator_glue.online.knowledge import Knowledge
+from actuator_glue.online.knowledge import Knowledge, Known
 from actuator_glue.online.playback import replay
 from actuator_glue.online.schedule import Schedule
 from actuator_glue.online.settings import EstimatorSettings
@@ -206,6 +207,42 @@ def test_a_prior_drifts_from_the_first_stamp_on(first_ns):
         knowledge.formed(at)
         spread.append(knowledge.prior(at).spread[0])
     assert spread == pytest.approx([0.0, 0.02, 0.04], abs=1e-3)
+
+
+@pytest.mark.parametrize('back', [0, -20, 3, 20, 200])
+def test_a_prior_is_checked_whatever_the_clock_does(back):
+    """A machine that changes as the clock is set back: alarms at the same windows."""
+
+    def alarms(step):
+        settings = EstimatorSettings(prior='calibration', contradiction='alarm')
+        knowledge, told = Knowledge(settings, known()), []
+        for i in range(70):
+            late = 10**12 + (i - (step if i >= 40 else 0)) * 10**9
+            at = window(i, late, int(i >= 40))
+            knowledge.prior(at)
+            told += knowledge.learn(at, None, Conflict(50.0, 2, 1e-6 if i >= 40 else 0.5))
+        return [alarm.number for alarm in told]
+
+    assert alarms(back) == alarms(0) and 40 < alarms(0)[0] < 50
+
+
+def test_windows_are_learned_from_whatever_the_clock_does():
+    """A posterior that came with a model holds samples of before the clock was set back."""
+    handed = Known(known(), 10**12 - 10**10, 10**12)
+    knowledge = Knowledge(EstimatorSettings(prior='sequential'), None, handed)
+    own = [known(seed=i) for i in range(20)]
+    for i in range(20):
+        late = 10**12 + (i - (200 if i >= 8 else 0)) * 10**9
+        at = window(i, late, int(i >= 8))
+        before = knowledge.prior(at)
+        knowledge.learn(at, own[i], None)
+        # A window counts from half a second on: it may follow those that ended before that.
+        if i in (3, 15):
+            assert before is not None and before.key == (
+                handed.carried.key if i == 3 else own[10].key
+            )
+        if i == 8:
+            assert before is None
 
 
 def test_memory_is_bounded():

@@ -89,3 +89,41 @@ def test_of_what_is_learned_without_a_calibration_what_windows_tell_is_handed_ov
     learned, _, _ = memory.before(45_000_000_000)
     assert learned.names == ('beta_1',) and learned.draws.mean() == pytest.approx(134.0, rel=1e-3)
     assert memory.before(44_000_000_000) is None
+
+
+def test_what_is_learned_after_the_clock_went_back_is_known():
+    """Posteriors from before that are of times that say no longer what was earlier."""
+    memory = Memory()
+    memory.setup(EstimatorSettings(prior='sequential'), known(0.0, 100.0).carried)
+    for second in range(1000, 1100):
+        memory.learn(known(float(second), 110.0), 950 * 10**9)
+    for second in range(500, 600):
+        # What is kept still begins with records of the old clock.
+        memory.learn(known(float(second), 120.0 + 0.1 * (second - 500)), 960 * 10**9)
+    draws, _, age = memory.before(550 * 10**9)
+    assert draws.draws[:, 0].mean() == pytest.approx(124.9) and age == pytest.approx(3.5)
+    draws, _, _ = memory.before(400 * 10**9)
+    assert draws.draws[:, 0].mean() == pytest.approx(100.0)
+
+
+def test_no_sample_counts_twice_where_the_clock_went_back():
+    """Records of both clocks: posteriors of the second seem to precede the first."""
+    command = 1e-3 * np.sin(np.linspace(0.0, 300.0, 6000))
+    collector, memory = Collector(180.0), Memory()
+    first = Record(command, command, 0.01, 250e3, start_ns=10**18)
+    second = replace(first, start_ns=10**18 - 200 * 10**9, first_index=6000)
+    for part in (first, second):
+        for item in stream(part, 50):
+            collector.setup(item) if isinstance(item, StreamSetup) else collector.push(item)
+    memory.setup(EstimatorSettings(prior='sequential'), known(0.0, 100.0).carried)
+    memory.began(first.start_ns)
+    for part in (first, second):
+        for after in range(10, 60, 5):
+            end = part.start_ns + after * 10**9
+            memory.learn(replace(known(0.0), middle_ns=end, last_ns=end), collector.first_ns)
+    records, (draws, _, _) = looked_at(collector, memory, 0.0)
+    assert [record.start_ns for record in records] == [first.start_ns, second.start_ns]
+    assert draws.draws[:, 0].mean() == pytest.approx(100.0)
+    (record,), (draws, _, age) = looked_at(collector, memory, 90.0)
+    assert record.start_ns == second.start_ns + 30 * 10**9
+    assert draws.draws[:, 0].mean() == pytest.approx(134.0) and age == pytest.approx(5.0)
