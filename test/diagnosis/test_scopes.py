@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.learned.forms import forms
-from actuator_glue.diagnosis.search.table import LINEAR, Row, outweighs, scoped, since, weighed
+from actuator_glue.diagnosis.search.conclusion import Conclusion
+from actuator_glue.diagnosis.search.table import (
+    HOLD,
+    LINEAR,
+    Row,
+    outweighs,
+    scoped,
+    since,
+    weighed,
+)
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.effects import Scale
@@ -70,6 +82,39 @@ def test_an_onset_must_matter() -> None:
     (since_then,) = scoped([row('delay', left=10.0)], 'since 3.0 s of a', 5.0)
     assert not outweighs(since_then, row('delay', left=np.hypot(10.0, 4.0)), MATERIAL, True)
     assert outweighs(since_then, row('delay', left=np.hypot(10.0, 8.0)), MATERIAL, True)
+
+
+def answer(found: Row, left: float) -> Any:
+    """An answer that leaves so much structure [um]; more than 6 um is unexplained."""
+    verdict = 'unexplained' if left > 6.0 else 'missing-effect'
+    out = SimpleNamespace(
+        row=found,
+        scope=found.scope,
+        found=SimpleNamespace(material=MATERIAL),
+        decision=SimpleNamespace(verdict=verdict, left=1e-6 * left),
+    )
+    out.matters = Conclusion.matters.fget(out)  # type: ignore[attr-defined]
+    return out
+
+
+def test_what_remains_unexplained_is_no_other_scope() -> None:
+    """Removing 5 of 25 um tells no hold or onset while 24 um remain; an effect it may tell.
+
+    A scope under which an effect explains all is told.
+    """
+
+    def first(*beside: tuple[Row, float]) -> bool:
+        other, told = (answer(*pair) for pair in beside)
+        return bool(Conclusion.outweighs(other, told))
+
+    plain = row(left=np.hypot(10.0, 25.0), price=4.0), 25.0
+    less = row(left=np.hypot(10.0, 24.0), price=4.0), 24.0
+    (linear,) = scoped([less[0]], LINEAR, HOLD)
+    (late,) = scoped([less[0]], 'since 9.5 s of a', 5.0)
+    assert not first((linear, 24.0), plain) and not first((late, 24.0), plain)
+    assert first((row('delay', left=np.hypot(10.0, 24.0), price=8.0), 24.0), plain)
+    (whole,) = scoped([row('delay', left=10.0, price=8.0)], LINEAR, HOLD)
+    assert first((whole, 0.0), plain)
 
 
 def test_scopes_of_scopes_are_told_together() -> None:

@@ -84,10 +84,21 @@ class Conclusion:
         return replace(found, left_out=math.hypot(found.left_out, line))
 
     def outweighs(self, other: Conclusion) -> bool:
-        """Whether it has more weight than another answer about the same records."""
-        material = min(self.found.material, other.found.material)
-        complete = any(answer.decision.verdict != 'unexplained' for answer in (self, other))
-        return table.outweighs(self.row, other.row, material, complete)
+        """Whether it has more weight than another answer about the same records.
+
+        Where neither explains them, what remains may look like another scope: there, differences
+        count in units of what remains.
+        """
+        both = self, other
+        complete = any(answer.decision.verdict != 'unexplained' for answer in both)
+        units = [a.found.material if self.scope == other.scope else a.matters for a in both]
+        return table.outweighs(self.row, other.row, min(units), complete)
+
+    @property
+    def matters(self) -> float:
+        """Least rms error that tells scopes apart: what matters, or what remains unexplained [m]."""
+        left = self.decision.left if self.decision.verdict == 'unexplained' else 0.0
+        return max(self.found.material, left)
 
     def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from actuator_glue.diagnosis.refits.candidates import mean_effects
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.score.weights import counted, log_weights, price
@@ -22,7 +23,7 @@ from actuator_glue.records import Array
 
 LINEAR = 'command linear between samples'
 SINCE = 'since '
-HOLD = math.log(2.0)  # nats: one hold of two was chosen
+HOLD = math.log(1 + len(mean_effects()))  # nats: another hold is one more candidate
 
 
 @dataclass(frozen=True, slots=True)
