@@ -96,6 +96,13 @@ def _both(result: Json) -> bool:
     return all(any(e in names for names in sets) for e in result['effects'])
 
 
+def _false_scope(result: Json) -> bool:
+    """Another hold, which no machine has, or an onset where nothing appeared."""
+    told = result['diagnosis']
+    hold = told.get('setup') is not None and bool(told['setup'].get('taken', True))
+    return hold or (told.get('onset') is not None and 'onset' not in result['sizes'])
+
+
 @dataclass(frozen=True)
 class Question:
     """A question that is answered by yes or no for each machine of some kind.
@@ -185,6 +192,12 @@ QUESTIONS: dict[str, Question] = {
         'machines with several effects, each of the noise and more: all named',
         _clear_pair,
         _both,
+    ),
+    'false_scope': Question(
+        'another hold, or an onset, told of a machine that has none',
+        lambda r: True,
+        _false_scope,
+        wanted=False,
     ),
     'greatest_weight': Question(
         'the structure that is told has the greatest weight, or within a nat of it',
