@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from actuator_glue.campaigns.change_points import change_points
+from actuator_glue.campaigns.day_left_out import left_out
 from actuator_glue.campaigns.effect_spells import effect_histories
 from actuator_glue.campaigns.history_data import HistoryData, Outlier
 from actuator_glue.campaigns.pooling import Pooled, pooled
@@ -98,22 +98,14 @@ def _outliers(rows: list[dict[str, Any]], series: Series, together: Pooled) -> t
 
 def _far(series: Series, together: Pooled) -> list[str]:
     """Return for each day why it is far from its level; empty where it is not."""
-    n, p = series.mean.shape
-    limit = float(chi2.isf(1.0 - (1.0 - _OUTLIERS) ** (1.0 / n), p))
+    limit = 1.0 - (1.0 - _OUTLIERS) ** (1.0 / len(series.days))
+    found = left_out(series, together)
     told = []
-    for t in range(n):
-        scatter = series.covariance[t] + np.diag(together.offset**2)
-        # The level as all other days tell it.
-        own, whole = np.diag(scatter), together.level_stddev[t] ** 2
-        others = 1.0 / np.maximum(1.0 / whole - 1.0 / own, 1e-3 / own)
-        level = others * (together.level[t] / whole - series.mean[t] / own)
-        spread = scatter + np.diag(others)
-        deviation = series.mean[t] - level
-        distance = float(deviation @ np.linalg.solve(spread, deviation))
-        worst = int(np.argmax(np.abs(deviation) / np.sqrt(np.diag(spread))))
+    for t, p_value in enumerate(found.p_value):
+        worst = int(np.argmax(np.abs(found.deviation[t]) / found.stddev[t]))
         told.append(
-            f'{series.names[worst]} {_off(float(deviation[worst]))} its level'
-            if distance > limit
+            f'{series.names[worst]} {_off(float(found.deviation[t, worst]))} its level'
+            if p_value < limit
             else ''
         )
     return told

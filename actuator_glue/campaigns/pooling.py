@@ -28,6 +28,8 @@ class Pooled:
         level, level_stddev: of the level that days scatter around, (n, p).
         walk: median of what a level walks in a root of a day, (p,).
         offset: median of the scatter of days, (p,).
+        walk_draws, offset_draws: draws of both from their posterior, (h, p).
+        jumps: places before which levels jump.
         next_draws: what the next test will find, SI units, (m, p).
         ahead: days from the last one to that test.
     """
@@ -39,6 +41,9 @@ class Pooled:
     level_stddev: Array
     walk: Array
     offset: Array
+    walk_draws: Array
+    offset_draws: Array
+    jumps: tuple[int, ...]
     next_draws: Array
     ahead: float
 
@@ -100,6 +105,9 @@ def pooled(
         level_stddev=level_stddev,
         walk=np.median(walk, axis=0),
         offset=np.median(offset, axis=0),
+        walk_draws=walk,
+        offset_draws=offset,
+        jumps=tuple(sorted(jumps)),
         next_draws=_next(means[:, -1], covariances[:, -1], walk, offset, ahead, rng),
         ahead=ahead,
     )

@@ -30,6 +30,7 @@ def write_table(
     days: int = 60,
     jump: tuple[int, tuple[float, ...]] | None = None,
     actuator: str = 'north',
+    ageing: float = 1.0,
     **columns: Any,
 ) -> Truth:
     """Write `results.parquet` with a test every third day; add to what is there.
@@ -40,12 +41,13 @@ def write_table(
         days: of test.
         jump: day of test from which on the logarithms are others, and by how much.
         actuator: its name.
+        ageing: how many times the usual walk its level walks.
         columns: further columns, by name, a value for each day.
     """
     rng = np.random.default_rng(seed)
     level, truth, rows = np.log(TABLE_2), Truth(), []
     for i in range(days):
-        level = level + np.sqrt(3.0) * _WALK * rng.standard_normal(4)
+        level = level + ageing * np.sqrt(3.0) * _WALK * rng.standard_normal(4)
         if jump is not None and i == jump[0]:
             level = level + np.array(jump[1])
         day = (date(2025, 1, 1) + timedelta(days=3 * i)).isoformat()

@@ -138,7 +138,10 @@ def test_a_test_far_off_is_an_outlier(tmp_path: Path) -> None:
         ('north/2025-03-02', 'reports/odd.html'),
         ('north/2025-04-28', ''),
     ]
-    assert far.outliers[1].reason.endswith(' times its level')
+    told = re.fullmatch(r'beta_1 (.*) % off its level', far.outliers[1].reason)
+    assert told is not None
+    # By exp(0.2) - 1, to three scatters of one day.
+    assert float(told[1]) == pytest.approx(22.1, abs=3.7)
     assert far.changes == ()  # one day alone may be that day's
     assert far.series.left_out.keys() == {'north/2025-03-02'}
 
