@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import norm
 
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
+from actuator_glue.campaigns.day_model import walked
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import actuators_of
 from actuator_glue.errors import InputError
@@ -19,7 +20,7 @@ from actuator_glue.records import Array
 # p-value of all parameters together below which two sides are of different machines.
 DIFFERENT = 0.01
 _TOLD = 5  # shared days that an error names
-HEADER = ('parameter', 'B over A', '2.5 %', '97.5 %', 'scatter of days', 'p')
+HEADER = ('parameter', 'B over A', '2.5 %', '97.5 %', 'ageing, scatter', 'p')
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,8 @@ class ParameterDifference:
     Attributes:
         name: the parameter.
         ratio, lower, upper: B over A with its 95 % limits, each side's posterior in them.
-        usual: standard deviation of the ratio's logarithm that scatter of days alone makes.
+        usual: standard deviation of the ratio's logarithm that ageing between the sides and
+            scatter of days alone make.
         p_value: of such a difference between days of one machine.
     """
 
@@ -66,7 +68,7 @@ class DaysCompared:
     def summary(self) -> str:
         """Return the answer in one line."""
         if not self.different:
-            return f'{self.actuator}: no difference beyond the scatter of days'
+            return f'{self.actuator}: no difference beyond ageing and scatter of days'
         worst = min(self.differences, key=lambda d: d.p_value)
         return (
             f'{self.actuator}: another machine: {worst.name} {100.0 * (worst.ratio - 1.0):+.1f} % '
@@ -95,9 +97,8 @@ def compare(folder: Path | str, a: str, b: str, *, actuator: str | None = None) 
     means, covariances = zip(*(_mean(found, side) for side in sides), strict=True)
     step = means[1] - means[0]
     spread = np.sqrt(np.diag(covariances[0] + covariances[1]))
-    usual = found.pooled.offset * np.sqrt(sum(1.0 / len(side) for side in sides))
-    whole = np.hypot(spread, usual)
-    p_values = 2.0 * norm.sf(np.abs(step) / whole)
+    usual = _usual(found, sides)
+    p_values = 2.0 * norm.sf(np.abs(step) / np.hypot(spread, usual))
     differences = tuple(
         ParameterDifference(
             name=name,
@@ -168,3 +169,18 @@ def _mean(found: ActuatorHistory, side: list[int]) -> tuple[Array, Array]:
     series: Any = found.series
     count = len(side)
     return series.mean[side].mean(axis=0), series.covariance[side].sum(axis=0) / count**2
+
+
+def _usual(found: ActuatorHistory, sides: Sequence[list[int]]) -> Array:
+    """Return the standard deviation of the sides' difference between days of one machine, (p,).
+
+    The level walks between the sides and within them, and each day has an offset. Jumps are no
+    part of it: they are what makes another machine. Medians of walk and offset do: the difference
+    itself is among the days that tell them, and makes both larger where they are hardly known.
+    """
+    weights = np.zeros(len(found.series.days))
+    for side, sign in zip(sides, (-1.0, 1.0), strict=True):
+        weights[side] = sign / len(side)
+    ageing = found.pooled.walk * np.sqrt(walked(found.series.times, weights))
+    offsets = found.pooled.offset * np.sqrt((weights**2).sum())
+    return np.asarray(np.hypot(ageing, offsets))

@@ -105,6 +105,23 @@ def log_likelihoods(
     return total
 
 
+def walked(times: Array, weights: Array) -> float:
+    """Return the variance of a weighted sum of levels, for a walk of 1 in a root of a day.
+
+    A step of the walk moves the levels of all later days alike, so that it counts with the sum of
+    their weights: the days between for two single days, less for stretches that are near.
+
+    Args:
+        times: days, ascending, (n,).
+        weights: of each day's level, (n,); their sum is zero, as for the difference of two means.
+
+    Returns:
+        Days: the variance over q^2.
+    """
+    later = np.cumsum(weights[::-1])[::-1][1:]
+    return float((np.diff(times) * later**2).sum())
+
+
 def hyper_draws(
     times: Array,
     y: Array,

@@ -12,7 +12,7 @@ import actuator_glue as ag
 from actuator_glue.api.pooled_prior import PooledPrior
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
 from actuator_glue.campaigns.comparison import compare
-from actuator_glue.campaigns.day_model import hyper_draws
+from actuator_glue.campaigns.day_model import hyper_draws, walked
 from actuator_glue.campaigns.history_page import lead
 from actuator_glue.campaigns.pooling import pooled
 from actuator_glue.campaigns.rows import read_results
@@ -180,6 +180,42 @@ def test_sides_of_a_repair_differ(repaired: Path, capsys: pytest.CaptureFixture[
     assert 'another machine: beta_1 +' in capsys.readouterr().out
     with pytest.raises(ag.InputError, match='no such test and no day'):
         compare(repaired, '1999-01-01', days[0])
+
+
+def test_ageing_makes_no_other_machine(tmp_path: Path) -> None:
+    """First and last days, and halves, of 12 histories that only age (seeds fixed).
+
+    By chance more than two of 24 differ once in 600 times: at most one in 100 does.
+    """
+    different = []
+    for seed in range(12):
+        folder = tmp_path / str(seed)
+        days = write_table(folder, seed=200 + seed, days=40, ageing=10.0).days
+        different += [
+            compare(folder, days[0], days[-1]).different,
+            compare(folder, f'{days[0]}:{days[19]}', f'{days[20]}:{days[39]}').different,
+        ]
+    assert sum(different) <= 2
+
+
+def test_a_change_of_an_ageing_machine_is_another_machine(tmp_path: Path) -> None:
+    """From one day to the next, ageing explains none of twelve scatters of days."""
+    for seed in range(6):
+        folder = tmp_path / str(seed)
+        jump = (20, (0.12, 0.0, 0.0, 0.0))
+        days = write_table(folder, seed=300 + seed, days=40, jump=jump, ageing=3.0).days
+        found = compare(folder, days[19], days[20])
+        assert found.different
+        assert min(found.differences, key=lambda d: d.p_value).name == 'beta_1'
+
+
+def test_what_sides_differ_by_as_a_level_walks() -> None:
+    """The days between for two days; for stretches, as the matrix of all days tells."""
+    times = np.array([0.0, 1.0, 4.0, 9.0, 11.0, 30.0])
+    assert walked(times, np.array([0.0, -1.0, 0.0, 0.0, 1.0, 0.0])) == pytest.approx(10.0)
+    weights = np.array([-1 / 3, -1 / 3, 1 / 3, 1 / 3, -1 / 3, 1 / 3])
+    together = np.minimum.outer(times, times)
+    assert walked(times, weights) == pytest.approx(weights @ together @ weights)
 
 
 def test_sides_that_share_a_day_are_refused(
