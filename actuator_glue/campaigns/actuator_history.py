@@ -14,7 +14,7 @@ from actuator_glue.campaigns.effect_spells import effect_histories
 from actuator_glue.campaigns.history_data import HistoryData, Outlier
 from actuator_glue.campaigns.pooling import Pooled, pooled
 from actuator_glue.campaigns.rows import read_results
-from actuator_glue.campaigns.series import Series, series_of, tests_of
+from actuator_glue.campaigns.series import Series, problems_of, series_of, tests_of
 from actuator_glue.diagnosis.verdicts import COMPLETE
 
 if TYPE_CHECKING:
@@ -73,7 +73,9 @@ def history(
         series=series,
         changes=changes,
         pooled=together,
-        effects=effect_histories([r for r in rows if r['verdict'] in COMPLETE]),
+        effects=effect_histories(
+            [r for r in rows if r['verdict'] in COMPLETE and not problems_of(r)]
+        ),
         outliers=_outliers(rows, series, together),
     )
 
@@ -88,8 +90,10 @@ def _outliers(rows: list[dict[str, Any]], series: Series, together: Pooled) -> t
         reason = ''
         if not row.get('failure') and row['verdict'] not in COMPLETE:
             reason = f'verdict {row["verdict"]}: more is left than the model tells'
-        elif group in where and far[where[group]]:
+        elif group in where:
             reason = far[where[group]]
+        elif not row.get('failure'):
+            reason = series.left_out[group]
         if reason:
             report = reports[group] if isinstance(reports[group], str) else ''
             found.append(Outlier(group, str(row['day']), reason, str(report)))

@@ -117,12 +117,27 @@ def series_of(table: DataFrame, actuator: str) -> Series:
     )
 
 
+def problems_of(row: dict[str, Any]) -> str:
+    """Return why the posterior of a test must not be used; empty where it may.
+
+    A complete diagnosis has answered those of the calibration. `converged` is no such reason: it
+    is of the calibration alone, and its posterior counts as reached up to a larger R-hat.
+
+    Args:
+        row: of a campaign; older tables have no column `problems`, joined ones may have gaps.
+    """
+    told = row.get('problems')
+    return told if isinstance(told, str) else ''
+
+
 def _numbers(row: dict[str, Any]) -> tuple[Array, Array] | str:
     """Return mean and covariance of the logarithms, or why there are none that hold."""
     if row.get('failure'):
         return str(row['failure'])
     if row['verdict'] not in COMPLETE:
         return f'verdict {row["verdict"]}: its intervals do not hold'
+    if reason := problems_of(row):
+        return reason
     text = row.get('pooling')
     value = json.loads(text) if isinstance(text, str) else None
     if value is None or tuple(value['names']) != NAMES:

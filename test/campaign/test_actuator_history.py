@@ -146,6 +146,29 @@ def test_a_test_far_off_is_an_outlier(tmp_path: Path) -> None:
     assert far.series.left_out.keys() == {'north/2025-03-02'}
 
 
+def test_a_posterior_that_must_not_be_used_tells_nothing(tmp_path: Path) -> None:
+    """It is listed with its problem and left out of level, effects and next test."""
+    problem = 'no posterior was reached: the chains of beta_1 have not met'
+    write_table(tmp_path / 'sound', seed=9, days=12)
+    write_table(
+        tmp_path / 'odd',
+        seed=9,
+        days=12,
+        jump=(11, (0.5, 0.0, 0.0, 0.0)),
+        problems=[problem if i == 11 else ('', None)[i % 2] for i in range(12)],
+        effects=['backlash' if i == 11 else '' for i in range(12)],
+    )
+    odd = history(tmp_path / 'odd', 'north')
+    (group,) = odd.series.left_out
+    assert odd.series.left_out == {group: problem}
+    assert [(o.group, o.reason) for o in odd.outliers] == [(group, problem)]
+    assert odd.effects == ()
+    before = pooled(series_of(read_results(tmp_path / 'sound'), 'north').until(11))
+    np.testing.assert_array_equal(odd.pooled.next_draws, before.next_draws)
+    with pytest.raises(ag.InputError, match='the chains of beta_1 have not met'):
+        compare(tmp_path / 'odd', odd.series.days[0], group)
+
+
 def test_its_next_test_is_a_prior(found: ActuatorHistory, tmp_path: Path) -> None:
     """Written, read by `calibrate`, told there, and narrower intervals with it."""
     path = found.prior.save(tmp_path / 'north.npz')
