@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from actuator_glue.campaigns.analysis import BETWEEN
 from actuator_glue.model.effects import CATALOGUE
@@ -36,8 +37,8 @@ class EffectHistory:
         meaning: what it is, for people; empty for one that the catalogue does not hold.
         remedy: what to check or to do about it, likewise.
         spells: when it was there.
-        sizes: parameter, its unit, and mean, lower and upper limit of the size on one day when it
-            is there.
+        sizes: parameter, its unit, and mean, lower and upper 95 % limit of the size that a test
+            of one more day tells where it is there.
         probability_next: that the next test will find it: it comes and goes between days of test
             with chances that all days tell (a Markov chain, Jeffreys priors).
     """
@@ -98,7 +99,14 @@ def _history(
 def _size(
     parameter: str, unit: str, effect: str, rows: Sequence[dict[str, Any]]
 ) -> tuple[str, str, float, float, float] | None:
-    """Return mean and 95 % limits of a size on one day: scatter of days and of each posterior."""
+    """Return mean and 95 % limits of the size that a test of one more day will tell.
+
+    What it tells differs from the mean by the scatter of days, by its own posterior and by the
+    mean's error. The spread of the means so far has each posterior in it already, so that only
+    what is beyond these is scatter of days. That of few days is hardly known: Student's t, with
+    degrees of freedom as of Satterthwaite (1946), since posteriors are known. One day tells no
+    scatter; the limits are then as if days had none.
+    """
     there = [
         r
         for r in rows
@@ -109,7 +117,9 @@ def _size(
         return None
     means = np.array([r[f'{parameter}_mean'] for r in there])
     widths = np.array([r[f'{parameter}_upper'] - r[f'{parameter}_lower'] for r in there])
-    within = np.mean((widths / (2.0 * 1.96)) ** 2)
-    spread = 1.96 * np.sqrt(within + (means.var(ddof=1) if len(means) > 1 else 0.0))
+    n, within = len(means), float(np.mean((widths / (2.0 * 1.96)) ** 2))
+    days = max(float(means.var(ddof=1)) - within, 0.0) if n > 1 else 0.0
+    freedom = (n - 1) * ((within + days) / days) ** 2 if days else np.inf
+    spread = float(student.isf(0.025, freedom)) * np.sqrt((within + days) * (1.0 + 1.0 / n))
     middle = float(means.mean())
     return parameter, unit, middle, middle - float(spread), middle + float(spread)

@@ -141,7 +141,7 @@ def _effects(effects: tuple[EffectHistory, ...]) -> Table:
         sizes = '; '.join(f'{word(n)} {spread(m, lo, hi, u)}' for n, u, m, lo, hi in e.sizes)
         rows.append([e.name, spells, sizes or '-', f'{e.probability_next:.2f}'])
     return Table(
-        ['effect', 'found on', 'size on a day', 'P(next test finds it)'],
+        ['effect', 'found on', 'size that one more test tells', 'P(next test finds it)'],
         rows,
         'Effects beyond Eq. (2) that diagnoses named.',
         prose=True,
