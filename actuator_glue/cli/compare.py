@@ -1,7 +1,7 @@
 """Compare two tests, days or stretches of days of an actuator: is it another machine.
 
-Exit code 0: no difference beyond the scatter of days and ageing. 1: another machine. 2: the input cannot be
-used.
+Exit code 0: no difference beyond ageing and scatter of days. 1: another machine. 2: the input
+cannot be used.
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ class Conclusion:
 
     @property
     def matters(self) -> float:
-        """Least rms error that tells scopes apart: what matters, or what remains unexplained [m]."""
+        """Rms error that tells scopes apart: what matters, or what remains unexplained [m]."""
         left = self.decision.left if self.decision.verdict == 'unexplained' else 0.0
         return max(self.found.material, left)
 
