@@ -110,6 +110,11 @@ class Setups:
         # Topics have no order among each other, so the last block may come after it.
         self._lately: list[tuple[int, StreamSetup]] = []
 
+    @property
+    def announced(self) -> tuple[StreamSetup, ...]:
+        """Those that hold from a sample on that has not come yet, in the order of the samples."""
+        return tuple(self._announced)
+
     def announce(self, setup: StreamSetup, following: int | None) -> bool:
         """Take a set-up; return whether it holds at once.
 

@@ -60,7 +60,7 @@ class WindowEstimate:
     """What was estimated in one window.
 
     Attributes:
-        window: its number.
+        window: its number, counted anew in each run.
         index: running index of its first sample.
         samples: how many it has.
         end_s: stream time of its end [s].
@@ -71,6 +71,7 @@ class WindowEstimate:
         bands: forecasts that ended in this window.
         tracking: how the actuator followed the command, where that was asked for.
         explanations: structures that are carried, the likeliest first, which names `parameters`.
+        run: of the estimator, from 1 on; it begins again where it is activated or started again.
     """
 
     window: int
@@ -84,6 +85,7 @@ class WindowEstimate:
     bands: tuple[ScoredBand, ...]
     tracking: RecordTracking | None = None
     explanations: tuple[WindowExplanation, ...] = ()
+    run: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,7 @@ class Compared:
         bands: how many were compared.
         differing: one line for each that differs or is missing.
         unrepeatable: one line for each window that cannot be repeated to the bit: the bag lacks
-            samples of it, or where it began.
+            samples or settings of it, or where it began.
     """
 
     posteriors: int

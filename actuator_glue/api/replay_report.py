@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,11 +34,12 @@ def header(found: ReplayData) -> tuple[str, ...]:
 def rows(found: ReplayData) -> list[tuple[str, ...]]:
     """Return a row of text for each of some windows, evenly chosen where there are many."""
     out = []
+    number = _numbered(found)
     for w in _some(_windows(found)):
         coverage = [b.coverage[-1] for b in w.bands if b.kind == 'total']
         out.append(
             (
-                str(w.window),
+                number(w),
                 f'{w.end_s:.2f}',
                 *(f'{p.mean:.4g} {_percent(p.stddev, p.mean)}' for p in w.parameters.values()),
                 f'{max(p.rhat for p in w.parameters.values()):.2f}',
@@ -58,9 +60,9 @@ def tracking_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, 
         return None
     names = list(dict.fromkeys(n for w in told if w.tracking for n in w.tracking.predicted))
     units = [shown(name) for name in names]
-    out = []
+    out, number = [], _numbered(found)
     for w in _some(told):
-        row = [str(w.window), f'{w.end_s:.2f}']
+        row = [number(w), f'{w.end_s:.2f}']
         for name, (_, _, factor) in zip(names, units, strict=True):
             of = None if w.tracking is None else w.tracking.predicted.get(name)
             numbers = () if of is None else (of.median, of.lower, of.upper)
@@ -102,6 +104,13 @@ def if_true_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, .
         out.append((name, *told, unit or '-'))
     shares = [f'{one.name} ({100 * one.weight:.0f} %)' for one in last]
     return ('parameter', *shares, 'unit'), out
+
+
+def _numbered(found: ReplayData) -> Callable[[WindowEstimate], str]:
+    """Return what names a window: its number, behind its run's where there are several."""
+    if len({w.run for w in found.windows}) > 1:
+        return lambda w: f'{w.run}:{w.window}'
+    return lambda w: str(w.window)
 
 
 def _some(windows: list[WindowEstimate]) -> list[WindowEstimate]:

@@ -49,9 +49,10 @@ class Replay(Result, ReplayData):
     def to_dataframe(self) -> DataFrame:
         """Return a table of the windows, a row for each by its number, in SI units.
 
-        Columns: `end_s`, `samples`, `converged`, `evaluations`, `rms_m` and `nrmse` of the best
-        draw, `coverage` of the last total band that ended in the window (widest level; NaN where
-        none did), and of each parameter NAME `NAME_mean`, `NAME_stddev`, `NAME_rhat`, `NAME_ess`.
+        Columns: `run`, `end_s`, `samples`, `converged`, `evaluations`, `rms_m` and `nrmse` of the
+        best draw, `coverage` of the last total band that ended in the window (widest level; NaN
+        where none did), and of each parameter NAME `NAME_mean`, `NAME_stddev`, `NAME_rhat`,
+        `NAME_ess`.
 
         Raises:
             InputError: pandas is not installed.
@@ -61,6 +62,7 @@ class Replay(Result, ReplayData):
             inside = [b.coverage[-1] for b in w.bands if b.kind == 'total' and b.coverage]
             row: dict[str, Any] = {
                 'window': w.window,
+                'run': w.run,
                 'end_s': w.end_s,
                 'samples': w.samples,
                 'converged': w.converged,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
 from typing import Any, Literal, TypedDict, Unpack
@@ -31,8 +31,9 @@ from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.motion import METRES
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
-from actuator_glue.online.playback import replay as run
+from actuator_glue.online.playback import replay as replayed
 from actuator_glue.online.replay_comparison import Published, ReplayComparison, compare, published
+from actuator_glue.online.runs import shares
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.stream import Rejected, structure_name
 from actuator_glue.sample_block import Block, check_block
@@ -102,7 +103,7 @@ class _Run:
     source: str
     items: Iterator[Item]
     total: int = 0
-    live: Published | None = None
+    runs: list[Published] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     windows: list[WindowEstimate] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
@@ -156,7 +157,7 @@ def replay(
     under_way = _open(source, namespace, compare_live=not asked)
     under_way.tracking = tracking
     started = time.perf_counter()
-    used = _settings(under_way.live, asked)
+    used = _settings(under_way.runs, asked)
     with shown('replay', 1.0, progress) as done:
         comparison = _estimate(under_way, used, done)
     if not under_way.windows:
@@ -214,18 +215,27 @@ def _open_bag(bag: str, namespace: str | None, compare_live: bool) -> _Run:
 
     out.items = told()
     if compare_live and any(t.type.endswith('PosteriorMoments') and t.count for t in topics):
-        out.live = published(decoded(bag, RESULTS, topics=names))
-        if out.live.settings is None or not out.live.models:
+        found = published(decoded(bag, RESULTS, counted=('SampleBlock',), topics=names))
+        out.runs = found if any(run.repeatable for run in found) else []
+        if not out.runs:
             out.notes.append(
                 'the bag has posteriors but no EstimatorSetup: there is nothing to compare with'
             )
-            out.live = None
+        elif len(found) > 1:
+            spans = ', '.join(run.span for run in found)
+            out.notes.append(
+                f'the estimator began {len(found)} times in this bag ({spans}): each run is '
+                'repeated and compared by itself'
+            )
+            if len({repr(run.settings) for run in found if run.repeatable}) > 1:
+                out.notes.append('its settings changed between runs; told are those of the last')
     return out
 
 
-def _settings(live: Published | None, asked: dict[str, Any]) -> EstimatorSettings:
-    if live is not None and live.settings is not None:
-        return live.settings
+def _settings(runs: list[Published], asked: dict[str, Any]) -> EstimatorSettings:
+    for run in reversed(runs):
+        if run.repeatable and run.settings is not None:
+            return run.settings
     # No clock runs here, so a budget of time says nothing; it must only fit the hop.
     if 'hop' in asked:
         asked = {**asked, 'time_budget': min(0.5, asked['hop'])}
@@ -233,37 +243,63 @@ def _settings(live: Published | None, asked: dict[str, Any]) -> EstimatorSetting
 
 
 def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayComparison | None:
-    """Run the estimator, filling in what is told of windows; compare with the live run."""
-    live = out.live
+    """Run the estimator, filling in what is told of windows; compare with the live runs."""
 
     def counted() -> Iterator[Item]:
         for place, item in enumerate(out.items):
+            done(place / out.total if out.total else 0.0)
+            yield item
+
+    def taken(share: Iterable[Item]) -> Iterator[Item]:
+        out.stretches.clear()
+        for item in share:
             if isinstance(item, Block):
                 out.took(item)
             elif isinstance(item, StreamSetup):
                 out.motion = item.motion
-            done(place / out.total if out.total else 0.0)
             yield item
 
-    def results(reports: Reports) -> Iterator[WindowResult]:
-        model = live.models[0][1] if live is not None else None
-        schedule = live.schedule() if live is not None else None
-        carried = live.carried if live is not None else None
-        for told in run(counted(), settings, model, schedule, reports, carried):
+    def results(share: Iterable[Item], live: Published | None, run: int) -> Iterator[WindowResult]:
+        found = (
+            replayed(taken(share), settings, reports=reports)
+            if live is None or live.settings is None
+            else replayed(
+                taken(share),
+                live.settings,
+                live.models[0][1],
+                live.schedule(),
+                reports,
+                live.carried,
+            )
+        )
+        for told in found:
             if isinstance(told, WindowResult):
                 # Not the result itself: its samples and bands are many.
-                out.windows.append(_window(told, out.tracking))
+                out.windows.append(_window(told, out.tracking, run))
                 out.effects = told.model.effects
                 yield told
             else:
                 out.events.append(getattr(told, 'message', str(told)))
 
     # Without a live run to compare with, the limits of bands are not needed.
-    with Reports(limits=live is not None) as reports:
-        found = results(reports)
-        comparison = None if live is None else compare(found, live, out.missing)
-        for _ in found:  # all of them, where nothing was compared
-            pass
+    with Reports(limits=bool(out.runs)) as reports:
+        if not out.runs:
+            for _ in results(counted(), None, 1):
+                pass
+            return None
+        comparison = ReplayComparison()
+        numbers = {id(run): number for number, run in enumerate(out.runs, 1)}
+        for live, share in shares(counted(), [run for run in out.runs if run.repeatable]):
+            number = numbers[id(live)]
+            found = compare(results(share, live, number), live, out.missing)
+            comparison.add(found, f'run {number}, ' if len(out.runs) > 1 else '')
+    for number, run in enumerate(out.runs, 1):
+        if not run.repeatable:
+            comparison.unrepeatable += [
+                f'run {number}, window {window}: not estimated: the EstimatorSetup of its run is '
+                'not in the bag'
+                for window in sorted(run.posteriors)
+            ]
     return comparison
 
 
@@ -274,7 +310,7 @@ def _usable_seconds(block: Block) -> float:
         return 0.0  # told by the estimator
 
 
-def _window(r: WindowResult, tracking: bool) -> WindowEstimate:
+def _window(r: WindowResult, tracking: bool, run: int) -> WindowEstimate:
     assert r.moments is not None and r.rhat is not None and r.ess is not None
     record, m = r.window.record, r.moments
     columns = (m.mean, m.stddev, m.skewness, m.cov, r.rhat, r.ess)
@@ -302,6 +338,7 @@ def _window(r: WindowResult, tracking: bool) -> WindowEstimate:
         ),
         tracking=window_tracking(r) if tracking else None,
         explanations=tuple(map(_explanation, r.structures, r.weights, r.parts)),
+        run=run,
     )
 
 

@@ -243,6 +243,7 @@ def decoded(
     path: Path | str,
     names: Collection[str],
     *,
+    counted: Collection[str] = (),
     topics: Collection[str] | None = None,
     note: Note = refuse,
 ) -> Iterator[tuple[str, Any]]:
@@ -251,14 +252,19 @@ def decoded(
     Args:
         path: bag folder or lone .mcap.
         names: types, bare names for those of actuator_glue_msgs.
+        counted: types of which only the place is wanted: None stands for each message.
         topics: topics wanted, all where None.
         note: as in `messages`.
 
     Raises:
         InputError: no bag, damage without `note`, or bytes that are no such message.
     """
-    types = {full_name(name) for name in names}
+    places = {full_name(name) for name in counted}
+    types = {full_name(name) for name in names} | places
     for found in as_published(messages(path, types=types, topics=topics, note=note)):
+        if found.type in places:
+            yield found.type, None
+            continue
         try:
             yield found.type, deserialize(found.type, found.data, found.definition)
         except InputError as error:

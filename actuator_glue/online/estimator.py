@@ -196,8 +196,9 @@ class Estimator:
         """Take one block of samples as it came; unusable ones are told, never raised."""
         events, windows = self._windows.push(block)
         for window in windows:
-            for member in self._members:
-                member.knowledge.formed(window)
+            if self._formed_live(window):
+                for member in self._members:
+                    member.knowledge.formed(window)
             planned = self._planned(window)
             if planned is None:
                 continue
@@ -532,6 +533,12 @@ class Estimator:
             for f in self._frozen
             if f.segment == window.segment and first <= f.end and f.stop <= window.end
         )
+
+    def _formed_live(self, window: Window) -> bool:
+        """Whether the live run formed a window, too: in a replay it may have begun later."""
+        if self.schedule is None or self.schedule.formed_ns is None:
+            return True
+        return window.record.start_ns >= self.schedule.formed_ns
 
     def _planned(self, window: Window) -> Window | None:
         """Return a window as the schedule numbers it; None where the live run dropped it."""

@@ -27,16 +27,22 @@ _THINNED = 200  # draws in a message, however many the next window began with
 
 @dataclass(slots=True)
 class Published:
-    """What a live estimator put into a bag.
+    """What one run of a live estimator put into a bag.
+
+    An estimator that is activated again, or started again, begins a run: its windows are numbered
+    from 0 and it knows nothing of those before.
 
     Attributes:
-        settings: its settings; None where the bag has no EstimatorSetup.
+        settings: its settings; None where the bag has no EstimatorSetup of the run.
         models: what is carried from each window number on.
         carried: draws that its priors began with; None where they began from the box.
         posteriors: PosteriorMoments by window number.
         draws: points that each window ended with, by its number, with their names.
         scored: scored PredictionBands by window number, index and kind, shortened by `_brief`: a
             long bag's bands do not fit into memory.
+        until: number of sample blocks recorded before its last result; the next run has had none
+            of them.
+        later: it is not the first run of the bag: samples before it were another's.
     """
 
     settings: EstimatorSettings | None = None
@@ -45,17 +51,51 @@ class Published:
     posteriors: dict[int, Any] = field(default_factory=dict)
     draws: dict[int, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
     scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
+    until: int = 0
+    later: bool = False
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether it has posteriors, and the bag says with which settings and model."""
+        return bool(self.posteriors and self.models) and self.settings is not None
+
+    @property
+    def stop(self) -> int:
+        """Running index behind the last sample that a posterior is of."""
+        last = self.posteriors[max(self.posteriors)]
+        return int(last.index) + int(last.samples)
+
+    @property
+    def span(self) -> str:
+        """Its first and last window, for people."""
+        return f'windows {min(self.posteriors)} to {max(self.posteriors)}'
+
+    def take(self, late: Published) -> None:
+        """Take results that were recorded after the next run's setup."""
+        self.posteriors |= late.posteriors
+        self.draws |= late.draws
+        self.scored |= late.scored
+        self.until = late.until
 
     def schedule(self) -> Schedule | None:
         """What was dropped and stopped early; None where nothing was published."""
         if not self.posteriors:
             return None
-        done = {}
-        for number, message in self.posteriors.items():
-            last = stamp_ns(message.header)
-            start = last - round((message.samples - 1) * message.period * 1e9)
-            done[int(message.index), start] = (number, _spent(message))
-        return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])), self.begun())
+        done = {
+            (int(message.index), _start_ns(message)): (number, _spent(message))
+            for number, message in self.posteriors.items()
+        }
+        models = tuple(sorted(self.models, key=lambda m: m[0]))
+        return Schedule(done, models, self.begun(), self._formed_ns() if self.later else None)
+
+    def _formed_ns(self) -> int | None:
+        """Return when window 0 began, unless a gap broke windows before the first posterior."""
+        if self.settings is None:
+            return None
+        number = min(self.posteriors)
+        hop = self.settings.hop
+        # Half a hop less: stamps are rounded.
+        return _start_ns(self.posteriors[number]) - round((number + 0.5) * hop * 1e9)
 
     def begun(self) -> dict[int, Begun]:
         """Return where each window began, by its number: where the one before it ended."""
@@ -89,30 +129,73 @@ class Published:
         return found
 
 
-def published(messages: Iterable[tuple[str, Any]]) -> Published:
-    """Collect what a live estimator published from (type name, message) pairs.
+def published(messages: Iterable[tuple[str, Any]]) -> list[Published]:
+    """Collect what a live estimator published from (type name, message) pairs, run by run.
+
+    Args:
+        messages: as a bag holds them; of a SampleBlock only the place counts.
+
+    Returns:
+        The runs in order, one where nothing was published; those without a posterior are left
+        out where there are others.
 
     Raises:
         InputError: impossible settings, model or posterior.
     """
-    found = Published()
+    runs, blocks = [Published()], 0
     for name, message in messages:
-        kind = name.rpartition('/')[2]
-        if kind == 'EstimatorSetup':
-            found.settings = conversion.estimator_settings(message)
-            found.carried = conversion.carried(message)
-            found.models.append((int(message.window), conversion.proposal(message)))
+        kind, now = name.rpartition('/')[2], runs[-1]
+        if kind == 'SampleBlock':
+            blocks += 1
+        elif kind == 'EstimatorSetup':
+            if _begins(message, now):
+                runs.append(now := Published(later=True))
+            now.settings = conversion.estimator_settings(message)
+            now.carried = conversion.carried(message)
+            now.models.append((int(message.window), conversion.proposal(message)))
         elif kind == 'PosteriorMoments':
             check_period(message.period, f'posterior of window {message.window}')
-            found.posteriors[int(message.window)] = message
+            if now.posteriors and int(message.window) <= max(now.posteriors):
+                now = _another(runs)
+            now.posteriors[int(message.window)] = message
+            now.until = blocks
         elif kind == 'PosteriorDraws' and len(message.parameter_names):
             names = tuple(message.parameter_names)
             values = np.asarray(message.values, dtype=np.float64)
-            found.draws[int(message.window)] = names, values.reshape(-1, len(names))
+            now.draws[int(message.window)] = names, values.reshape(-1, len(names))
         elif kind == 'PredictionBand' and message.scored:
             key = (int(message.window), int(message.index), str(message.kind))
-            found.scored[key] = _brief(message)
+            now.scored[key] = _brief(message)
+    found = [run for run in runs if run.posteriors] or runs[-1:]
+    found[0].later = False
     return found
+
+
+def _begins(setup: Any, now: Published) -> bool:
+    """Whether an EstimatorSetup is of another run than the one collected now."""
+    if now.settings is None or int(setup.window) != 0:
+        return False
+    # A model that was asked for before the first window is announced with the window's actuator;
+    # what an activation announces has none yet.
+    return bool(now.posteriors) or not setup.header.frame_id
+
+
+def _another(runs: list[Published]) -> Published:
+    """Return the run of a posterior whose number is not above those of the last run."""
+    now, before = runs[-1], runs[-2] if len(runs) > 1 else None
+    if before is not None and before.posteriors and max(before.posteriors) < min(now.posteriors):
+        # A recorder may take the setup of a run before the last results of the one before it.
+        before.take(now)
+        runs[-1] = Published(now.settings, now.models, now.carried, later=True)
+    else:
+        runs.append(Published(later=True))  # its EstimatorSetup is not in the bag
+    return runs[-1]
+
+
+def _start_ns(message: Any) -> int:
+    """Return the acquisition time of the first sample that a PosteriorMoments is of [ns]."""
+    length = round((int(message.samples) - 1) * float(message.period) * 1e9)
+    return int(stamp_ns(message.header)) - length
 
 
 def _spent(message: Any) -> tuple[int, ...]:
@@ -144,6 +227,13 @@ class ReplayComparison:
         if not self.windows and self.unrepeatable and not self.differing:
             return None
         return self.windows > 0 and not self.differing
+
+    def add(self, other: ReplayComparison, run: str = '') -> None:
+        """Take in the comparison of another run; `run` names it before each line."""
+        self.windows += other.windows
+        self.bands += other.bands
+        self.differing += [run + line for line in other.differing]
+        self.unrepeatable += [run + line for line in other.unrepeatable]
 
 
 def compare(
@@ -193,8 +283,12 @@ def _hold(result: WindowResult, message: Any, live: Published, found: ReplayComp
     names = differences(conversion.posterior(result, float('nan'))[1], message)
     if names:
         found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
+    lacking = 0
     for prediction in result.scored:
         key = (prediction.number, prediction.index, prediction.kind)
+        if key not in live.scored and number == max(live.posteriors):
+            lacking += 1  # published after the posterior: the run may have been killed between
+            continue
         if key not in live.scored:
             found.differing.append(f'window {number}: band {key} was not published live')
             continue
@@ -203,6 +297,11 @@ def _hold(result: WindowResult, message: Any, live: Published, found: ReplayComp
         names = differences(fields, live.scored[key])
         if names:
             found.differing.append(f'band {key} differs in {", ".join(names)}')
+    if lacking:
+        found.unrepeatable.append(
+            f'window {number}: {lacking} of its bands are not compared: the run, or the bag, '
+            'ended before they were recorded'
+        )
 
 
 class _Digest(NamedTuple):

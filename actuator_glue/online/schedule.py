@@ -60,8 +60,11 @@ class Schedule:
         models: what is carried from each window number on, ascending.
         begun: where each window began, by its number, for those whose predecessor cannot be
             computed again.
+        formed_ns: acquisition time of the first sample of the first window that was formed [ns],
+            whether it gave a posterior or not; None for the first one of the stream.
     """
 
     done: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]]
     models: tuple[tuple[int, ModelChoice | Proposal], ...] = ()
     begun: Mapping[int, Begun] = field(default_factory=dict)
+    formed_ns: int | None = None

@@ -19,6 +19,7 @@ from actuator_glue.online import conversion
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import items, replay, stream
 from actuator_glue.online.replay_comparison import ReplayComparison, compare, published
+from actuator_glue.online.runs import shares
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import structure_name
 from actuator_glue.records import Array
@@ -51,13 +52,18 @@ def replay_bag(bag: Path) -> ReplayComparison:
     Raises:
         InputError: the bag is damaged.
     """
-    live = published(decoded(bag, RESULTS))
-    if live.settings is None or not live.models:
+    runs = published(decoded(bag, RESULTS, counted=('SampleBlock',)))
+    if not all(run.repeatable for run in runs):
         return ReplayComparison(differing=['no estimator published its settings into this bag'])
-    streamed, model = items(decoded(bag, INPUTS)), live.models[0][1]
+    comparison = ReplayComparison()
     with Reports() as reports:
-        results = replay(streamed, live.settings, model, live.schedule(), reports, live.carried)
-        return compare((r for r in results if isinstance(r, WindowResult)), live)
+        for live, share in shares(items(decoded(bag, INPUTS)), runs):
+            assert live.settings is not None
+            model, schedule = live.models[0][1], live.schedule()
+            results = replay(share, live.settings, model, schedule, reports, live.carried)
+            found = compare((r for r in results if isinstance(r, WindowResult)), live)
+            comparison.add(found)
+    return comparison
 
 
 def from_the_box(content: Content) -> list[WindowResult]:

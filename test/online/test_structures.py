@@ -207,7 +207,7 @@ def test_a_bag_tells_what_was_carried_from_which_window_on():
     proposal = both(Known(Carried((*NAMES, 'backlash'), draws), 10**18 + 1, 10**18 + 7))
     first = conversion.estimator_setup(SETTINGS, choose_model(), 0, 0)
     later = conversion.estimator_setup(SETTINGS, proposal, 9, 1800)
-    live = published(('EstimatorSetup', SimpleNamespace(**f)) for f in (first, later))
+    (live,) = published(('EstimatorSetup', SimpleNamespace(**f)) for f in (first, later))
     assert live.settings == SETTINGS
     assert live.models == [(0, choose_model()), (9, proposal)]
 

@@ -44,7 +44,7 @@ def finish(probe, recorder, estimator, samples):
 
 def replayed(bag):
     """Comparison of a replay with what was published live, and the live results."""
-    live = published(decoded(bag, RESULTS))
+    (live,) = published(decoded(bag, RESULTS))
     again = replay(items(decoded(bag, INPUTS)), live.settings, live.models[0][1], live.schedule())
     return compare([r for r in again if isinstance(r, WindowResult)], live), live
 
