@@ -109,6 +109,8 @@ class DiagnoserNode(WorkingNode):
     def do_report(self) -> None:
         """Coverage, what is being done, and what explains the samples."""
         super().do_report()
+        if self.active and (reason := self.collector.unused):
+            self.complain('test set-up', f'{reason}: these samples are not diagnosed')
         if hasattr(self, 'loop'):
             self.health.values.update(
                 {
@@ -212,7 +214,8 @@ class DiagnoserNode(WorkingNode):
         self._goal = handle
         try:
             streamed = () if handle.request.records else tuple(self.collector.records())
-            request = diagnoser_worker.asked(handle.request, streamed)
+            reason = self.collector.unused
+            request = diagnoser_worker.asked(handle.request, streamed, reason)
             if streamed:
                 request = replace(request, known=self.memory.before(earliest(streamed)))
             self._take(live.Requested(bool(streamed)))

@@ -93,20 +93,20 @@ class Outcome:
     remembered: Remembered | None = None
 
 
-def asked(goal: Any, live: tuple[Record, ...]) -> Request:
+def asked(goal: Any, live: tuple[Record, ...], unused: str = '') -> Request:
     """Return the request of a Diagnose goal.
 
     Args:
         goal: the goal.
         live: the samples received so far, used where the goal names no records.
+        unused: why samples that are received cannot be used; empty where they can.
 
     Raises:
         InputError: nothing to diagnose.
     """
     if not goal.records and not live:
-        raise InputError(
-            'no stretch of 5 s without a gap has been received and the goal names no records'
-        )
+        reason = unused or 'no stretch of 5 s without a gap has been received'
+        raise InputError(f'{reason}, and the goal names no records')
     return Request(
         records=live,
         paths=tuple(goal.records),

@@ -123,13 +123,7 @@ class EstimatorNode(WorkingNode):
     # Samples in.
 
     def _setup(self, message: Any) -> None:
-        setup = from_message(message)
-        self._tell(self.estimator.setup(setup))
-        if setup.stiffness is None:
-            self.complain(
-                'test set-up',
-                f'the specimen stiffness of {setup.actuator!r} is not known: nothing is estimated',
-            )
+        self._tell(self.estimator.setup(from_message(message)))
 
     def _preview(self, message: Any) -> None:
         self._tell(self.estimator.preview(conversion.preview(message)))
@@ -144,10 +138,7 @@ class EstimatorNode(WorkingNode):
                 'start', f'begins anew at sample {block.index}: nothing is known of those before'
             )
         self._tell(self.estimator.push(block))
-        if self.estimator.test is None:
-            self.complain(
-                'test set-up', f'samples arrive, but nothing on {topics.TEST_SETUP.name} yet'
-            )
+        self._say_unused()
         self._next(time.monotonic())
 
     def _tell(self, events: list[Event]) -> None:
@@ -177,6 +168,11 @@ class EstimatorNode(WorkingNode):
                 self._say_identifiable()
             elif isinstance(event, Restarted):
                 self.complain(event.reason, event.message)
+
+    def _say_unused(self) -> None:
+        """Complain while the set-up that governs the present samples lets none be used."""
+        if reason := self.estimator.unused:
+            self.complain('test set-up', f'{reason}: nothing is estimated')
 
     def _say_identifiable(self) -> None:
         test = self.estimator.test
@@ -357,6 +353,7 @@ class EstimatorNode(WorkingNode):
         """Report, while it lasts, what speaks against the posteriors, or that none come."""
         if not self.compiling:
             self.silence.tell(self, topics.SAMPLES.name, now)
+        self._say_unused()
         self.health.values['converged windows'] = f'{sum(self.judged)} of {len(self.judged)}'
         if len(self.judged) == JUDGED and 2 * sum(self.judged) < JUDGED:
             self.complain('sampling', f'most of the last {JUDGED} windows have not converged')

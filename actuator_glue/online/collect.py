@@ -41,6 +41,11 @@ class Collector:
         """Acquisition time of the first sample that is kept [ns]; None where none is."""
         return self._kept[0].record.start_ns if self._kept else None
 
+    @property
+    def unused(self) -> str:
+        """Why the samples that come now are not kept; empty where they are, or none came."""
+        return self._windows.unused
+
     def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up."""
         return self._windows.setup(setup)

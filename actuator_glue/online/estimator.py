@@ -184,6 +184,11 @@ class Estimator:
         return self._windows.current
 
     @property
+    def unused(self) -> str:
+        """Why the samples that come now are not estimated with; empty where they are."""
+        return self._windows.unused
+
+    @property
     def waiting(self) -> tuple[Window, ...]:
         """The windows that wait, the next one first."""
         return tuple(self._waiting)

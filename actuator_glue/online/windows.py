@@ -105,6 +105,20 @@ class SlidingWindows:
         self._rate = 1.0
         self._watch = RateWatch(self._rate)
 
+    @property
+    def unused(self) -> str:
+        """Why the samples that come now are part of no window; empty where they are, or none came.
+
+        What is announced for later samples, or has passed, says nothing of those.
+        """
+        if self._next is None:
+            return ''
+        if self.current is None:
+            return 'samples arrive, but nothing on test_setup yet'
+        if self.current.stiffness is None:
+            return f'the specimen stiffness of {self.current.actuator!r} is not known'
+        return ''
+
     def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up; it holds from the sample it names, at once where that is past."""
         return self._begin(setup) if self._setups.announce(setup, self._next) else []

@@ -388,3 +388,28 @@ def test_what_is_no_period_is_not_the_same():
     assert same_period(0.005, 0.005 * (1.0 + 9e-5)) and same_period(200.0, 200.01)
     for one, other in ((0.005, 0.005001), (np.nan, 0.005), (np.nan, np.nan), (0.0, 0.005)):
         assert not same_period(one, other) and not same_period(other, one)
+
+
+def test_the_set_up_that_governs_the_samples_says_whether_they_are_used():
+    """Neither one that has passed nor one announced for later is what holds now."""
+    windows = SlidingWindows(SETTINGS)
+    windows.setup(setup(stiffness=None))
+    windows.setup(setup(index=1000))
+    assert windows.unused == ''  # no sample has come
+    windows.push(block(4000, 100))
+    assert windows.unused == ''
+    windows.setup(setup(stiffness=None, index=8000))
+    windows.push(block(4100, 100))
+    assert windows.unused == ''
+    windows.setup(setup(stiffness=None, index=4200))
+    windows.push(block(4200, 100))
+    assert windows.unused == "the specimen stiffness of 'actuator' is not known"
+    windows.setup(setup(index=4300))
+    windows.push(block(4300, 100))
+    assert windows.unused == ''
+
+
+def test_samples_before_any_set_up_are_said_to_lack_it():
+    windows = SlidingWindows(SETTINGS)
+    windows.push(block(0, 100))
+    assert windows.unused == 'samples arrive, but nothing on test_setup yet'
