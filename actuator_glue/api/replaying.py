@@ -113,6 +113,22 @@ class _Run:
     motion: str = METRES
     # Running indices of the first sample of each stretch without a gap, and of the one after it.
     stretches: list[tuple[int, int]] = field(default_factory=list)
+    # The first set-up with a stiffness, or else the last one; and why one cannot be used.
+    setup: StreamSetup | None = None
+    refused: str = ''
+
+    @property
+    def no_window(self) -> str:
+        """Why there is no window at all, behind a colon; empty where no reason is known."""
+        if not self.stretches:
+            return ': it has no samples'
+        give = 'give the specimen stiffness with --stiffness N/m, 0 for a free actuator'
+        if self.setup is None:
+            refused = f' that can be used ({self.refused})' if self.refused else ''
+            return f': it has samples, but nothing on test_setup{refused}; {give}'
+        if self.setup.stiffness is None:
+            return f': the specimen stiffness of {self.setup.actuator!r} is not known; {give}'
+        return ''
 
     def took(self, block: Block) -> None:
         """Count the samples of a block."""
@@ -161,7 +177,8 @@ def replay(
     with shown('replay', 1.0, progress) as done:
         comparison = _estimate(under_way, used, done)
     if not under_way.windows:
-        raise InputError(f'{under_way.source}: not one window could be estimated')
+        reason = under_way.no_window
+        raise InputError(f'{under_way.source}: not one window could be estimated{reason}')
     return Replay(
         bag=under_way.source,
         settings={name: getattr(used, name) for name in OVERRIDES},
@@ -210,6 +227,7 @@ def _open_bag(bag: str, namespace: str | None, compare_live: bool) -> _Run:
     def told() -> Iterator[Item]:
         for item in items(decoded(bag, INPUTS, topics=names), rejected):
             out.notes += [r.message for r in rejected]
+            out.refused = out.refused or (rejected[0].message if rejected else '')
             rejected.clear()
             yield item
 
@@ -257,6 +275,8 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayC
                 out.took(item)
             elif isinstance(item, StreamSetup):
                 out.motion = item.motion
+                if out.setup is None or out.setup.stiffness is None:
+                    out.setup = item
             yield item
 
     def results(share: Iterable[Item], live: Published | None, run: int) -> Iterator[WindowResult]:

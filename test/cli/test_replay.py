@@ -1,5 +1,6 @@
 """replay: the estimator over a bag, and held against what it published live."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -251,3 +252,26 @@ def test_what_cannot_be_replayed(run, tmp_path: Path, estimated: Callable[..., P
     assert run('replay', bag, '--namespace', '/b', *fast).code == 0
     assert 'outside' in run('replay', bag, '--namespace', 'a', '--window', -1).message
     assert 'not one window' in run('replay', bag, '--namespace', 'a', '--window', 60).message
+
+
+@pytest.mark.parametrize(
+    ('stiffness', 'told'),
+    [(None, 'samples, but nothing on test_setup'), (-1.0, 'stiffness .* is not known')],
+)
+def test_samples_that_nobody_described_are_named(
+    run, short_bag: Path, tmp_path: Path, stiffness: float | None, told: str
+) -> None:
+    """The sentence of the live node, and what can be done; with a stiffness there are windows."""
+    bag = tmp_path / 'bare'
+    with BagWriter(bag) as writer:
+        for found in bag_messages(short_bag):
+            content = messages.deserialize(found.type, found.data)
+            if found.type.endswith('/TestSetup'):
+                if stiffness is None:
+                    continue
+                content.specimen_stiffness = stiffness
+            writer.add_topic(found.topic, found.type)
+            writer.write(found.topic, content, found.log_time)
+    said = run('replay', bag).message
+    assert re.search(told, said) and '--stiffness' in said, said
+    assert run('replay', bag, '--stiffness', 250e3, '--evaluations', 4000).code == 0
