@@ -10,7 +10,8 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import BagMessage, as_published, is_bag, messages
+from actuator_glue.io.bag_reader import BagMessage, as_published, is_bag, messages, summarise
+from actuator_glue.io.bag_samples import SAMPLE_BLOCK, topics_of_actuator
 from actuator_glue.io.messages import as_current, deserialize
 from actuator_glue.nodes import spin, streamer, topics
 from actuator_glue.nodes.pacer import Step
@@ -19,16 +20,22 @@ from actuator_glue.nodes.partners import type_name
 
 SPECS = (
     Spec('bag', '', 'bag folder or .mcap file', read_only=True),
+    Spec('namespace', '', 'whose samples, where a bag has several actuators', read_only=True),
     Spec('results', False, 'publish the recorded results too, not only samples', read_only=True),
     Spec('clock', False, 'publish the recorded time on /clock', read_only=True),
     *streamer.specs(exit_at_end=True),
 )
 INPUTS = (topics.SAMPLES, topics.TEST_SETUP, topics.PREVIEW)
-RESULTS = (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.DIAGNOSIS)
+RESULTS = (*topics.ESTIMATED, topics.MARGIN, topics.DIAGNOSIS)
+# What those who join late get too; that of a stream's beginning comes before all else.
+SETUPS = frozenset(type_name(topic.type) for topic in (topics.TEST_SETUP, topics.ESTIMATOR_SETUP))
 
 
 class ReplayNode(streamer.Streamer):
-    """Publishes what a bag holds, at the pace it was recorded, under its own topic names."""
+    """Publishes what a bag holds of one actuator, at the pace it was recorded.
+
+    The topics are the node's own, whatever those of the bag are called.
+    """
 
     stamps_now = False
 
@@ -40,20 +47,42 @@ class ReplayNode(streamer.Streamer):
         self.path = self.parameters['bag']
         if not is_bag(self.path):
             raise InputError(f'parameter bag = {self.path!r} is neither a bag nor an .mcap file')
+        self.names = self._chosen()
         chosen = INPUTS + (RESULTS if self.parameters['results'] else ())
         self._outputs = {type_name(t.type): self.publisher(t) for t in chosen}
         clock = topics.Topic('/clock', Clock, topics.PREVIEW.qos)
         self._time: Any = self.publisher(clock) if self.parameters['clock'] else None
+
+    def _chosen(self) -> list[str] | None:
+        """Return the topics of the actuator that is wanted, None where no topic has samples.
+
+        Raises:
+            InputError: there are samples of several and none is chosen, or there are none of the
+                one that is.
+        """
+        summary = summarise(self.path)
+        space = self.parameters['namespace'] or None
+        samples = [name for name, topic in summary.topics.items() if topic.type == SAMPLE_BLOCK]
+        if space is None and len(samples) > 1:
+            raise InputError(
+                f'{self.path}: samples of {len(samples)} actuators ({", ".join(samples)}); choose '
+                'one with the parameter namespace'
+            )
+        if space is None and not samples:
+            return None
+        return topics_of_actuator(self.path, summary, space)
 
     def stream(self) -> Iterator[Step]:
         """Yield the messages of the bag, set-ups before their samples, as they were recorded."""
         first: int | None = None
         note = partial(self.complain, 'bag')
         setup = type_name(topics.TEST_SETUP.type)
-        for found in as_published(messages(self.path, types=tuple(self._outputs), note=note)):
-            if first is None and found.type == setup:
+        wanted = messages(self.path, types=tuple(self._outputs), topics=self.names, note=note)
+        for found in as_published(wanted):
+            if first is None and found.type in SETUPS:
                 self._publish(found)
-                self.introduce()
+                if found.type == setup:
+                    self.introduce()
                 continue
             first = found.log_time if first is None else first
             due = (found.log_time - first) * 1e-9
