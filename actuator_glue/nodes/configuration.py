@@ -20,7 +20,7 @@ from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import CHOICES, LIMITS, EstimatorSettings
-from actuator_glue.online.structures import Proposal, Proposed
+from actuator_glue.online.structures import MATERIALS, Proposal, Proposed, spreads
 
 
 def _specs() -> list[Spec]:
@@ -133,17 +133,39 @@ def carried(values: Mapping[str, Any]) -> Carried | None:
 def requested(request: Any) -> Proposal:
     """Return the structures that a SetModel request names.
 
+    One without structures is a way out of whatever was carried before: it begins with what the
+    node was started with.
+
     Raises:
         InputError: unknown effects or parameters, one that is named twice, lists that do not
-            belong together.
+            belong together, a material error no test has, draws that no prior can be made of.
     """
     if not request.structures:
-        return Proposal.of(_model(request))
-    material = float(request.material)
-    return Proposal(
-        tuple(Proposed(_model(s), float(s.weight), _known(s)) for s in request.structures),
-        material if material > 0.0 else math.nan,
-    )
+        return Proposal((Proposed(_model(request)),), afresh=True)
+    structures = []
+    for one in request.structures:
+        model, known = _model(one), _known(one)
+        if known is not None:
+            _check_spread(model, known)
+        structures.append(Proposed(model, float(one.weight), known))
+    return Proposal(tuple(structures), _material(float(request.material)))
+
+
+def _material(value: float) -> float:
+    """Return the smallest forecast error that matters [m]; NaN where none was given.
+
+    Raises:
+        InputError: it is outside of what a test can have.
+    """
+    if value == 0.0 or math.isnan(value):
+        return math.nan
+    least, most = MATERIALS
+    if not least <= value <= most:
+        raise InputError(
+            f'material {value:g} m is outside [{least:g}, {most:g}] m; give 0 for half of the '
+            'sensor noise'
+        )
+    return value
 
 
 def _model(named: Any) -> ModelChoice:
@@ -172,6 +194,28 @@ def _known(structure: Any) -> Known | None:
         raise InputError(f'{draws.size} numbers are no draws of {len(names)} parameters')
     carried = Carried(names, draws.reshape(-1, len(names)))
     return Known(carried, int(structure.known_middle), int(structure.known_last))
+
+
+def _check_spread(model: ModelChoice, known: Known) -> None:
+    """Check that the draws of each parameter differ: a prior is made of how they scatter.
+
+    Raises:
+        InputError: those of a parameter within its bounds are all the same.
+    """
+    names, draws = known.carried.names, known.carried.draws
+    at = [i for i, name in enumerate(names) if name in model.names]
+    places = [model.names.index(names[i]) for i in at]
+    low, high = np.array(model.lower)[places], np.array(model.upper)[places]
+    # What lies outside of the bounds is left out of the prior.
+    inside = draws[((draws[:, at] >= low) & (draws[:, at] <= high)).all(axis=1)][:, at]
+    if not len(inside):
+        return  # refused with the bounds
+    alike = [names[i] for i, column in zip(at, inside.T, strict=True) if not spreads(column)]
+    if alike:
+        raise InputError(
+            f'the known draws of {", ".join(alike)} are all the same; give draws that say how '
+            'well it is known, or leave it out'
+        )
 
 
 def _once(names: Sequence[str], where: str) -> None:

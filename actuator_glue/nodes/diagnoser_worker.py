@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from dataclasses import fields as dataclass_fields
@@ -26,7 +25,7 @@ from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.messages import fill
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.conversion import Fields, Head
-from actuator_glue.online.structures import Proposal, Proposed
+from actuator_glue.online.structures import MATERIALS, Proposal, Proposed, spreads
 from actuator_glue.online.when_to_diagnose import Concluded, LiveSettings
 from actuator_glue.records import Record
 from actuator_glue.setups import known_stiffness
@@ -164,8 +163,14 @@ def requested(proposal: Proposal) -> Any:
     """Return the SetModel request that has an estimator carry structures."""
     return SetModel.Request(
         structures=[_structure(one) for one in proposal.structures],
-        material=0.0 if math.isnan(proposal.material) else proposal.material,
+        material=_material(proposal.material),
     )
+
+
+def _material(value: float) -> float:
+    """Return a material error as a request has it [m]: a simulated record may lack any noise."""
+    least, most = MATERIALS
+    return min(max(value, least), most) if value > 0.0 else 0.0
 
 
 def _structure(one: Proposed) -> Any:
@@ -179,8 +184,11 @@ def _structure(one: Proposed) -> Any:
         start=list(model.start),
     )
     if known is not None:
-        message.known_names = list(known.carried.names)
-        message.known = known.carried.draws.ravel().tolist()
+        names, draws = known.carried.names, known.carried.draws
+        # Where all draws ended at a bound, they say nothing of how well a parameter is known.
+        differ = [i for i, column in enumerate(draws.T) if spreads(column)]
+        message.known_names = [names[i] for i in differ]
+        message.known = draws[:, differ].ravel().tolist()
         message.known_middle, message.known_last = known.middle_ns, known.last_ns
     return message
 

@@ -402,6 +402,8 @@ class Estimator:
     def _begin(self, proposal: Proposal) -> None:
         """Carry these structures from now on; a structure carried before keeps its knowledge.
 
+        Unless the proposal begins afresh: then only the points that its next window starts from.
+
         Where there are several, Eq. (2) and the structures carried before are the references
         that the others have to beat.
         """
@@ -416,6 +418,8 @@ class Estimator:
             if member is None or _box(member.model) != _box(one.model):
                 known = Knowledge(self.settings, self._carried, one.known, began)
                 member = _Member(one.model, known)
+            elif proposal.afresh:
+                member.knowledge = Knowledge(self.settings, self._carried, None, began)
             member.before, member.worse = False, 0
             self._members.append(member)
             told.append(replace(one, model=member.model))

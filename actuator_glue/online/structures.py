@@ -22,7 +22,7 @@ from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.informative_prior import informative_prior
 from actuator_glue.json_value import json_value
 from actuator_glue.online.knowledge import Known
-from actuator_glue.records import Array
+from actuator_glue.records import LONGEST_STROKE, Array
 
 # c: nats that an error of m beyond the best costs if it lasts, as in a diagnosis of records.
 COARSE = 4.0
@@ -34,6 +34,11 @@ LEAVES = 0.01
 MOST = 3
 # Default of m, in standard deviations of the sensor noise.
 MATERIAL = 0.5
+# Limits of an m that is asked for [m]: no sensor of displacement resolves less, no actuator moves
+# farther. Beyond them its square leaves the range of numbers.
+MATERIALS = (1e-9, LONGEST_STROKE)
+# Range of draws, over the largest, that says nothing: no record fixes a parameter so closely.
+_ALIKE = 1e-9
 # No single forecast costs more than this many (error/m)^2: it may have diverged.
 _WORST = 1e3
 # Least weight of a structure proposed beside another: less is not worth a share of the time.
@@ -71,6 +76,7 @@ class Proposal:
     Attributes:
         structures: the likeliest first; `MOST` at most.
         material: smallest forecast error that matters [m]; NaN for half of the sensor noise.
+        afresh: a structure that is carried already forgets what it learned from earlier samples.
 
     Raises:
         InputError: no or too many structures, one twice, a weight that is not positive, or
@@ -79,6 +85,7 @@ class Proposal:
 
     structures: tuple[Proposed, ...]
     material: float = field(default=math.nan, compare=False)
+    afresh: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.structures)
@@ -109,8 +116,9 @@ class Proposal:
 
     @property
     def plain(self) -> bool:
-        """Whether it is one structure of which nothing is known."""
-        return len(self.structures) == 1 and self.structures[0].known is None
+        """Whether it is one structure of which nothing is known, nor to be forgotten."""
+        one = len(self.structures) == 1 and self.structures[0].known is None
+        return one and not self.afresh
 
     def to_json(self) -> dict[str, Any]:
         """Return a JSON object from which `from_json` makes the same bits."""
@@ -128,6 +136,7 @@ class Proposal:
                 }
                 for one in self.structures
             ],
+            **({'afresh': True} if self.afresh else {}),
         }
 
     @staticmethod
@@ -154,7 +163,9 @@ class Proposal:
                         None if known is None else Known.from_json(known, source),
                     )
                 )
-            return Proposal(tuple(found), _number(value['material']))
+            return Proposal(
+                tuple(found), _number(value['material']), bool(value.get('afresh', False))
+            )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f'{source}: the structures cannot be read ({error})') from error
 
@@ -163,6 +174,11 @@ class Proposal:
         """Log probabilities (K,) that they come in with."""
         weights = np.array([one.weight for one in self.structures])
         return np.asarray(np.log(weights / weights.sum()))
+
+
+def spreads(column: Array) -> bool:
+    """Return whether the draws (m,) of a parameter differ by more than rounding can."""
+    return bool(np.ptp(column) > _ALIKE * np.abs(column).max())
 
 
 def most_in_all(window: float, hop: float) -> int:

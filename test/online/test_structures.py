@@ -451,3 +451,37 @@ def test_without_rivals_that_were_there_before_nothing_is_taken_out():
     """Who asks for one structure has it, whatever it forecasts."""
     estimator = Estimator(SETTINGS, Proposal((Proposed(choose_model(('backlash',))),)))
     assert not estimator._outdone((1.0,), 1e-9)
+
+
+@pytest.mark.parametrize('afresh', [False, True])
+def test_a_structure_that_begins_afresh_forgets_what_it_learned(afresh):
+    """What it learned may be what no window can be estimated with; a replay forgets it, too."""
+    settings = replace(SETTINGS, prior='sequential', drift=0.0)
+    proposal = Proposal((Proposed(choose_model()),), afresh=afresh)
+    estimator, found, priors = Estimator(settings, choose_model()), [], {}
+    items = list(stream(lost_motion(10.0)))
+    for item in items:
+        give(estimator, item)
+        while (job := estimator.next_job()) is not None:
+            number = job.window.number
+            priors[number] = job.prior
+            found.append(run(job))
+            estimator.finish(found[-1])
+            if number == 8:
+                estimator.set_model(proposal)
+    assert priors[8] is not None and (priors[9] is None) is afresh
+    assert priors[max(priors)] is not None
+    # As a bag has it.
+    told = conversion.estimator_setup(settings, proposal, 9, 0)
+    read = Proposal.of(conversion.proposal(SimpleNamespace(**told)))
+    assert read.afresh is afresh
+    done = {
+        (r.window.record.first_index, r.window.record.start_ns): (r.window.number, r.spent)
+        for r in found
+    }
+    models = ((0, choose_model()), (9, read))
+    again = replay(items, settings, schedule=Schedule(done, models))
+    twice = [r for r in again if isinstance(r, WindowResult)]
+    assert len(twice) == len(found)
+    for one, other in zip(found, twice, strict=True):
+        assert np.array_equal(one.moments.mean, other.moments.mean)
