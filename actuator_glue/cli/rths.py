@@ -60,8 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--ground-motion',
         metavar='RECORD',
-        help='every draw runs this record: AT2 (PEER), text with time [s] and acceleration '
-        '[m/s^2], or artificial[:SEED]',
+        help='every draw runs this record: AT2 (PEER), text with time and acceleration and their '
+        'units in the names (m/s^2 where none is said), or artificial[:SEED]',
     )
     parser.add_argument(
         '--scale', type=number, metavar='F', help='factor of the ground motion (default 1)'
@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     from actuator_glue.api.stability_report import HEADER, lines, rows
     from actuator_glue.io.ground_motion import read_ground_motion
 
-    motion = None if args.ground_motion is None else read_ground_motion(args.ground_motion)
+    motion = None if args.ground_motion is None else read_ground_motion(args.ground_motion, note)
     if args.scale is not None:
         if motion is None:
             raise InputError('--scale needs a --ground-motion to scale')

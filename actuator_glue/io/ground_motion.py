@@ -1,32 +1,74 @@
-"""Ground motions from files: PEER's AT2, and delimited text."""
+"""Ground motions from files: PEER's AT2, and delimited text.
+
+The unit of an acceleration is part of what the file says: in the name of its column, in a line of
+units below the names, or as `units of g`. What is said and not understood is refused.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.ground_motion import GroundMotion, artificial
+from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.signature import text_encoding
+from actuator_glue.io.units import ROLES
 from actuator_glue.records import Array
 
 GRAVITY = 9.80665  # m/s^2
 _LARGEST = 200_000_000  # bytes
 _NUMBER = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?')
 _UNEVEN = 0.02  # share of the sample period
+# Factors to m/s^2, by units as `_plain` writes them.
+_UNITS = {
+    **dict.fromkeys(('g', "g's", 'gs'), GRAVITY),
+    '%g': 0.01 * GRAVITY,
+    'mg': 1e-3 * GRAVITY,
+    **dict.fromkeys(('gal', 'gals'), 1e-2),
+    'mgal': 1e-5,
+}
+for _unit, _length in {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'in': 0.0254, 'ft': 0.3048}.items():
+    _UNITS |= dict.fromkeys((f'{_unit}/s2', f'{_unit}/s/s', f'{_unit}s-2'), _length)
+    _UNITS[f'{_unit}ps2'] = _length
+_LISTED = 'g, gal, m/s^2, cm/s^2, mm/s^2, in/s^2 or ft/s^2'
+_MEND = f'name the columns `time_s,acceleration_UNIT` with {_LISTED}'
+_TIME = re.compile(r'(?:time|zeit|temps|tiempo|t|sec(?:ond)?s?|s)(?![a-z])', re.IGNORECASE)
+_OTHER = re.compile(
+    r'(?<![a-z])(?:veloc\w*|vel|speed|geschw\w*|displ\w*|disp|dis|weg|posit\w*|force|kraft)(?![a-z])',
+    re.IGNORECASE,
+)
+_ACCELERATION = re.compile(r'(?<![a-z])(?:acc|beschl)', re.IGNORECASE)
+_BRACKETS = re.compile(r'[\[({]\s*([^\[\](){}]*?)\s*[\])}]')
+# `units of g`, `Units: cm/s2`; a unit ends at a comma, a bracket or the end of a sentence.
+_SAID = re.compile(
+    r'\bunits?(?:\s+of\s+|\s*[:=]\s*)(?:acceleration\s*[:=]?\s*)?([^,;()\s]+)', re.IGNORECASE
+)
+# Which of several directions a column is, behind its `_`: no unit.
+_DIRECTION = re.compile(
+    r'[xyznsewuhvl]|ns|ew|ud|up|vert(ical)?|hor(izontal)?|[hxyz]\d|\d+|ground|base|input',
+    re.IGNORECASE,
+)
 
 
-def read_ground_motion(given: Path | str) -> GroundMotion:
+def read_ground_motion(
+    given: Path | str, warn: Callable[[str], None] = warn_caller
+) -> GroundMotion:
     """Return the ground motion of a file, or an artificial one.
 
     Args:
-        given: 'artificial' or 'artificial:SEED'; a file of PEER's AT2 format (in g); or delimited
-            text with columns time [s] and acceleration [m/s^2], a heading allowed.
+        given: 'artificial' or 'artificial:SEED'; a file of PEER's AT2 format; or delimited text
+            with columns of time and acceleration. Units are those that the heading says (time in
+            s where it says none); where it says no unit of acceleration, or there is no heading,
+            it is m/s^2.
+        warn: called with a line where that had to be taken.
 
     Raises:
-        InputError: no such file, or one that holds no ground motion.
+        InputError: no such file, one that holds no ground motion, a unit that is not understood,
+            or another quantity than acceleration.
     """
     name, _, seed = str(given).partition(':')
     path = Path(given)
@@ -45,21 +87,52 @@ def read_ground_motion(given: Path | str) -> GroundMotion:
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: ground motion is not text in UTF-8') from error
     found = re.search(r'\bDT\s*=\s*(' + _NUMBER.pattern + ')', text[:2000], re.IGNORECASE)
-    if found is not None:
+    if found is not None and not _is_table(text, _float(found.group(1))):
         return _at2(path, text, _float(found.group(1)))
-    return _columns(path, text)
+    return _columns(path, text, warn)
 
 
 def _float(text: str) -> float:
     return float(text.replace('D', 'E').replace('d', 'e'))
 
 
+def _plain(unit: str) -> str:
+    """Return a unit as `_UNITS` has it: small, without brackets, powers and seconds in one way."""
+    unit = unit.strip(' \t"\'[](){}.,;').lower().replace('²', '2').replace('⁻', '-')
+    unit = re.sub(r'\s*([/*^·])\s*', r'\1', unit.replace('**', '^'))
+    unit = re.sub(r'_?(?:\bper\b|_per_|_)\s*', '/', unit)
+    unit = re.sub(r'sec(?:ond)?s?', 's', unit)
+    unit = re.sub(r'\b(?:inch|inches)\b', 'in', re.sub(r'\b(?:feet|foot)\b', 'ft', unit))
+    return re.sub(r'[\s*·^]', '', unit)
+
+
+def _is_table(text: str, period: float) -> bool:
+    """Whether rows of a text that says its DT are a time and a value each."""
+    rows = []
+    for line in text.splitlines():
+        try:
+            row = [_float(v) for v in re.split(r'[,;\s]+', line.strip().strip(',;'))]
+        except ValueError:
+            continue
+        if len(row) != 2:
+            return False
+        rows.append(row)
+        if len(rows) == 3:
+            steps = np.diff([time for time, _ in rows])
+            return bool((np.abs(steps - period) <= _UNEVEN * period).all())
+    return False
+
+
 def _at2(path: Path, text: str, period: float) -> GroundMotion:
-    """Return PEER's: a heading that ends with NPTS and DT, then accelerations in g, row by row."""
+    """Return PEER's: a heading that ends with NPTS and DT, then accelerations, row by row."""
     lines = text.splitlines()
     heading = next(i for i, line in enumerate(lines) if re.search(r'\bDT\s*=', line, re.I))
-    if not re.search(r'\bg\b|units of g', ' '.join(lines[: heading + 1]), re.IGNORECASE):
-        raise InputError(f'{path}: an AT2 file says `UNITS OF G`; this one does not')
+    factor = _of_heading(path, lines[: heading + 1])
+    if factor is None:
+        raise InputError(
+            f'{path}: an AT2 file says `UNITS OF G`; this one does not: write its unit there, '
+            f'{_LISTED}'
+        )
     try:
         values = np.array([_float(v) for line in lines[heading + 1 :] for v in line.split()])
     except ValueError as error:
@@ -67,14 +140,138 @@ def _at2(path: Path, text: str, period: float) -> GroundMotion:
     count = re.search(r'\bNPTS\s*=\s*(\d+)', text[:2000], re.IGNORECASE)
     if count is not None and int(count.group(1)) != len(values):
         raise InputError(f'{path}: NPTS is {count.group(1)}, but {len(values)} values follow')
-    return GroundMotion(GRAVITY * values, period, path.name)
+    return GroundMotion(factor * values, period, path.name)
 
 
-def _columns(path: Path, text: str) -> GroundMotion:
+def _of_heading(path: Path, lines: list[str]) -> float | None:
+    """Return the factor to m/s^2 of the unit in lines without columns; None where there is none.
+
+    Raises:
+        InputError: another quantity, or a unit that is none of acceleration, or two.
+    """
+    text = '\n'.join(lines)
+    # `VELOCITY TIME SERIES`, but not the velocities of filters and sites: `VS30 VELOCITY`.
+    told = re.search(rf'({_OTHER.pattern})\s+(?:time\s+)?(?:series|hist)', text, re.IGNORECASE)
+    if told is not None:
+        raise InputError(f'{path}: holds {told[1].lower()}, and a ground acceleration is needed')
+    said = [unit.rstrip('.') for unit in _SAID.findall(text)]
+    # Brackets hold remarks as well as units.
+    said += [unit for unit in _BRACKETS.findall(text) if _plain(unit) in _UNITS]
+    factors = {unit: _factor(path, unit) for unit in said}
+    if len(set(factors.values())) > 1:
+        raise InputError(
+            f'{path}: the heading says {" and ".join(factors)}; keep the one it is in'
+        )
+    return next(iter(factors.values()), None)
+
+
+def _factor(path: Path, unit: str) -> float:
+    """Return the factor from a unit to m/s^2.
+
+    Raises:
+        InputError: it is not understood, or of no acceleration.
+    """
+    if _plain(unit) not in _UNITS:
+        raise InputError(
+            f'{path}: {unit.strip()!r} is no unit of acceleration that is understood; {_MEND}'
+        )
+    return _UNITS[_plain(unit)]
+
+
+def _unit_in(name: str) -> str:
+    """Return the unit that the name of a column of acceleration has; empty without one."""
+    inside = [text for text in _BRACKETS.findall(name) if not _DIRECTION.fullmatch(text)]
+    if inside:
+        return str(inside[-1])
+    if told := re.search(r'(?<=[\s_])in[\s_]+(.+)$', name):
+        return told[1]
+    # `acceleration_g`, `acceleration_m_per_s2`, `acceleration g`, `acc/g`
+    words = [w for w in re.split(r'[_\s,]+', name) if w and not _DIRECTION.fullmatch(w)]
+    if words == ['a', 'g']:
+        return name  # the symbol of ground acceleration, or a unit: nothing tells which
+    for begin in range(1, len(words)):
+        if _plain('_'.join(words[begin:])) in _UNITS:
+            return '_'.join(words[begin:])
+    last = words[-1] if words else ''
+    if len(words) > 1 and '_' in name and not _ACCELERATION.match(last):
+        return last
+    return last.partition('/')[2]
+
+
+def _pair(line: str) -> tuple[str, str] | None:
+    """Return the two entries of a line of names or of units, None where there are not two."""
+    for delimiter in (';', '\t', ','):
+        if delimiter in line.strip(' \t,;'):
+            entries = [e.strip().strip('"\'') for e in line.strip(' \t,;').split(delimiter)]
+            return (entries[0], entries[1]) if len(entries) == 2 else None
+    match = re.fullmatch(r'\s*(\S+(?:\s*[\[(][^\])]*[\])])?)\s+(\S.*)', line)
+    return (match[1], match[2].strip()) if match is not None else None
+
+
+def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple[float, float]:
+    """Return the factors of time to s and of acceleration to m/s^2 that a table's heading says.
+
+    Raises:
+        InputError: another quantity, or a unit that is not understood.
+    """
+    seconds, factors, rest = 1.0, dict[str, float](), list[str]()
+    for line in heading:
+        pair = _pair(line)
+        bare = pair[0].strip('[](){} ') if pair is not None else ''
+        if pair is not None and bare in ROLES['time'] and _plain(pair[1]) in _UNITS:
+            seconds = ROLES['time'][bare]  # a line of units
+            factors[pair[1]] = _factor(path, pair[1])
+            continue
+        timed = pair is not None and _TIME.match(pair[0]) is not None
+        parted = re.search(r'\S\s*[;\t,]\s*\S', line) is not None
+        if pair is None or not (timed or (parted and _ACCELERATION.search(pair[1]))):
+            rest.append(line)
+            continue
+        first, second = pair
+        if _OTHER.search(second.replace('_', ' ')):
+            raise InputError(
+                f'{path}: column {second!r} is no acceleration; give time and ground acceleration'
+            )
+        told = ([*_BRACKETS.findall(first), *re.split(r'[_/\s]+', first)[1:]] or [''])[0]
+        if timed and told and told not in ROLES['time']:
+            raise InputError(
+                f'{path}: column {first!r} has a unit of time that is not understood; use s or ms'
+            )
+        seconds = ROLES['time'][told] if timed and told else seconds
+        unit = _unit_in(second)
+        if unit:
+            factors[unit] = _factor(path, unit)
+    spoken = _OTHER.search(' '.join(rest).replace('_', ' '))
+    if not factors and spoken is not None:
+        raise InputError(
+            f'{path}: the heading speaks of {spoken[0]}, and no column of acceleration with '
+            f'its unit is named; {_MEND}'
+        )
+    other = _of_heading(path, rest)
+    if other is not None:
+        factors['the line above'] = other
+    if len(set(factors.values())) > 1:
+        raise InputError(
+            f'{path}: the heading says two units of acceleration ({" and ".join(factors)}); keep '
+            'the one that it is in'
+        )
+    if not factors:
+        warn(
+            f'{path}: says no unit of acceleration, so m/s^2 was taken; where it is another one, '
+            f'{_MEND}'
+        )
+    return seconds, next(iter(factors.values()), 1.0)
+
+
+def _columns(path: Path, text: str, warn: Callable[[str], None]) -> GroundMotion:
     """Return a table's: time and acceleration."""
     rows: list[list[float]] = []
+    heading: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):
-        if not line.strip() or line.lstrip().startswith(('#', '%')):
+        comment = line.lstrip().startswith(('#', '%'))
+        if comment and not rows:
+            heading.append(line.lstrip('#% \t'))
+        if not line.strip() or comment:
             continue
         try:
             values = [_float(v) for v in re.split(r'[,;\s]+', line.strip().strip(',;'))]
@@ -83,18 +280,20 @@ def _columns(path: Path, text: str) -> GroundMotion:
                 raise InputError(
                     f'{path}: line {number} is not numbers ({line.strip()!r})'
                 ) from error
-            continue  # a heading
+            heading.append(line)
+            continue
         if len(values) != 2:
             raise InputError(
-                f'{path}: line {number} has {len(values)} numbers; give time [s] and ground '
-                'acceleration [m/s^2]'
+                f'{path}: line {number} has {len(values)} numbers; give time and ground '
+                f'acceleration: {_MEND}'
             )
         rows.append(values)
     if len(rows) < 2:
         raise InputError(f'{path}: holds no ground motion: no rows of time and acceleration')
+    seconds, factor = _units(path, heading, warn)
     table: Array = np.array(rows)
     steps = np.diff(table[:, 0])
     period = float(np.median(steps))
     if not period > 0.0 or np.abs(steps - period).max() > _UNEVEN * period:
         raise InputError(f'{path}: times do not rise evenly; resample the ground motion first')
-    return GroundMotion(table[:, 1], period, path.name)
+    return GroundMotion(factor * table[:, 1], seconds * period, path.name)

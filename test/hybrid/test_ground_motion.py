@@ -53,8 +53,63 @@ def test_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ('heading', 'factor'),
+    [
+        ('time_s,acceleration_g', GRAVITY),
+        ('time_s,acceleration_m/s2', 1.0),
+        ('time_s,acceleration_m_per_s2', 1.0),
+        ('time,Acceleration [cm/s^2]', 1e-2),
+        ('"Time (sec)","Ground acceleration (ft/sec/sec)"', 0.3048),
+        ('Time [s] Ground acceleration [cm/s^2]', 1e-2),
+        ('# time acc/gal', 1e-2),
+        ('n.s.,acceleration_g', GRAVITY),
+        ('% t, a in mm/s²', 1e-3),
+        ('El Centro 1940 NS\n# units: in/s**2', 0.0254),
+        ('Time;Acceleration NS\n(s);(Gal)', 1e-2),
+        ('El Centro, peak velocity 33 cm/s\ntime,acc [g] (NS)', GRAVITY),
+        ('# DT = 0.02\n# time_s,acceleration_g', GRAVITY),
+    ],
+)
+def test_the_unit_is_the_one_that_the_heading_says(
+    heading: str, factor: float, tmp_path: Path
+) -> None:
+    """The same motion, whatever it is written in; nothing is said where nothing was taken."""
+    path = tmp_path / 'record.csv'
+    rows = '\n'.join(f'{0.02 * i:g},{v / factor!r}' for i, v in enumerate((0.0, 1.5, -2.0)))
+    path.write_text(f'{heading}\n{rows}\n')
+    lines: list[str] = []
+    found = read_ground_motion(path, lines.append)
+    np.testing.assert_allclose(found.acceleration, [0.0, 1.5, -2.0], rtol=1e-12)
+    assert found.period == pytest.approx(0.02) and not lines
+
+
+def test_what_says_no_unit_is_metres_and_is_told(tmp_path: Path) -> None:
+    """With a heading or without one; times in their unit."""
+    path = tmp_path / 'record.csv'
+    for heading in ('', 'time_ms,acceleration_x\n'):
+        lines: list[str] = []
+        path.write_text(f'{heading}0,0\n0.5,1\n1,-1\n')
+        found = read_ground_motion(path, lines.append)
+        assert np.abs(found.acceleration).max() == 1.0
+        assert found.period == (0.5e-3 if heading else 0.5)
+        assert len(lines) == 1 and 'm/s^2 was taken' in lines[0]
+
+
+@pytest.mark.parametrize(
     ('text', 'said'),
     [
+        ('time_s,velocity_m/s\n0,1\n0.1,2\n', 'is no acceleration'),
+        ('time [s], v\nVelocity [m/s]\n0,1\n0.1,2\n', 'speaks of Velocity'),
+        ('time_s,acceleration_furlong\n0,1\n0.1,2\n', "'furlong' is no unit of acceleration"),
+        ('time_s,acceleration [m/s]\n0,1\n0.1,2\n', "'m/s' is no unit of acceleration"),
+        ('# units: g\ntime_s,acceleration_m/s2\n0,1\n0.1,2\n', 'two units'),
+        ('time_min,acceleration_g\n0,1\n0.1,2\n', 'unit of time'),
+        ('time,a_g\n0,1\n0.1,2\n', "'a_g' is no unit"),
+        (
+            'VELOCITY TIME SERIES IN UNITS OF CM/S, STATION G\nNPTS= 2, DT= .01\n1 2\n',
+            'holds velocity',
+        ),
+        ('STATION G\nNPTS= 2, DT= .01\n1 2\n', 'UNITS OF G'),
         ('nothing here\n', 'no rows'),
         ('0 1\n0.1 2\n0.5 3\n', 'evenly'),
         ('0 1 2\n0.1 2 3\n', 'has 3 numbers'),
@@ -63,7 +118,7 @@ def test_files(tmp_path: Path) -> None:
         ('0 1\n0.1 1e6\n', 'm/s'),
         ('0 1\n0.1 nan\n', 'finite'),
         ('IN UNITS OF G\nNPTS= 3, DT= .01\n1 2\n', 'NPTS is 3'),
-        ('IN UNITS OF CM/S\nNPTS= 2, DT= .01\n1 2\n', 'UNITS OF G'),
+        ('IN UNITS OF CM/S\nNPTS= 2, DT= .01\n1 2\n', "'CM/S' is no unit of acceleration"),
         ('IN UNITS OF G\nNPTS= 2, DT= .01\n1 x\n', 'no number'),
     ],
 )
