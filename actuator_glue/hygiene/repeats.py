@@ -2,7 +2,9 @@
 
 Two tests of one command differ by noise. Where two measured channels agree sample for sample
 within what they are written with, one is a copy of the other or a part of it: with fewer digits,
-in another unit, cut out, or with every second sample.
+in another unit, cut out, or with every second sample. Another zero, sign or gain makes no other
+test either, as long as there is noise that both share: without any, a linear machine gives one
+motion in all sizes.
 """
 
 from __future__ import annotations
@@ -27,6 +29,15 @@ _UNITS = (1.0, 0.0254)  # m: digits are those of metres (and mm) or of inches
 _NEAR = 0.05  # of the spread: no table is coarser, and most pairs of records end here
 _TIES = 1e-6  # of a step: rounding errors of what is written and read
 _LOOK = 1000  # values that are looked at before all of a channel are
+_EXACT = 1e-9  # of the spread: rounding errors of another zero and gain
+# Half steps that a value may be off besides, over the root of the number of values out of which
+# zero and gain come: they are off by two thirds of one over that root.
+_FITTED = 3.0
+# Noise is what neither the samples before it nor the command foretell, of the spread of the
+# motion: a machine without noise leaves less, a measurement more.
+_NOISE = 2e-5
+_SHARED = 0.5  # of the noise: what is left of it between copies; between two tests more than all
+_BEFORE, _LAGS, _TAKEN = 8, 40, 4000  # samples of motion and command, and how many are foretold
 
 
 def refuse_repeats(records: Sequence[Record], held: Sequence[Record] = ()) -> None:
@@ -70,7 +81,10 @@ def refuse_known(records: Sequence[Record], sketches: Sequence[Array], prior: st
     """
     known = [one for many in sketches for one in many]
     for i, record in enumerate(records):
-        if any(_same(record.measured, known[n], at) for n, at in _places(record.measured, known)):
+        if any(
+            _same(record.measured, known[n], at, record.command)
+            for n, at in _places(record.measured, known)
+        ):
             raise InputError(
                 f'{where(record, i + 1)} holds the same samples as a record of which the prior '
                 f'from {prior} was made, and would count twice; give other records, or no prior'
@@ -82,16 +96,29 @@ def _repeated(one: Record, other: Record) -> bool:
     fine, coarse = (one, other) if one.period <= other.period else (other, one)
     every = round(coarse.period / fine.period)
     thinned = range(every) if 1 < every <= _MOST_EVERY else ()
-    return _agree(fine.measured, coarse.measured) or any(
-        _agree(fine.measured[first::every], coarse.measured) for first in thinned
+    return _agree(fine.measured, coarse.measured, fine.command) or any(
+        _agree(fine.measured[first::every], coarse.measured, fine.command[first::every])
+        for first in thinned
     )
 
 
-def _agree(one: Array, other: Array) -> bool:
-    """Whether two channels are the same wherever both have samples, at some shift."""
+def _agree(one: Array, other: Array, command: Array) -> bool:
+    """Whether two channels are the same wherever both have samples, at some shift.
+
+    Args:
+        one: measured, (n,) [m].
+        other: measured, (m,) [m].
+        command: what `one` followed, (n,) [m].
+    """
     parts = list(_parts(other))
     places = _places(one, [other[part] for part in parts])
-    return any(_same(one, other, at - parts[n].start) for n, at in places)
+    seen: set[int] = set()
+    for n, at in places:
+        shift = at - parts[n].start
+        if shift not in seen and _same(one, other, shift, command):
+            return True
+        seen.add(shift)
+    return False
 
 
 def _parts(values: Array) -> Iterator[slice]:
@@ -103,25 +130,31 @@ def _parts(values: Array) -> Iterator[slice]:
 
 
 def _places(values: Array, stretches: Sequence[Array]) -> Iterator[tuple[int, int]]:
-    """Yield where each of some stretches is nearest to a channel, with the stretch's number.
+    """Yield where each of some stretches is most like a channel, with the stretch's number.
 
-    None of those that are longer than the channel, or rest.
+    In any size and about any zero. None of those that are longer than the channel, or rest.
     """
-    zero = float(values.mean())  # less of the sums cancels
-    values = values - zero
-    sums = np.cumsum(np.append(0.0, values**2))
+    values = values - float(values.mean())  # less of the sums cancels
+    sums = np.cumsum(np.append(0.0, values))
+    squares = np.cumsum(np.append(0.0, values**2))
     for n, stretch in enumerate(stretches):
         size = len(stretch)
         if size <= len(values) and _changes(stretch) >= _FEWEST:
             # Overlap-add: a transform of the whole channel would take ten times as long.
-            products = scipy.signal.oaconvolve(values, (stretch - zero)[::-1], 'valid')
-            yield n, int(np.argmin(sums[size:] - sums[:-size] - 2.0 * products))
+            like = scipy.signal.oaconvolve(values, (stretch - stretch.mean())[::-1], 'valid')
+            spread = squares[size:] - squares[:-size] - (sums[size:] - sums[:-size]) ** 2 / size
+            # What rests here is like anything, by its rounding errors.
+            least = _EXACT * float(squares[-1]) / len(values) * size
+            like *= like
+            like /= np.maximum(spread, max(least, 1e-300))
+            yield n, int(np.argmax(like))
 
 
-def _same(one: Array, other: Array, shift: int) -> bool:
+def _same(one: Array, other: Array, shift: int, command: Array) -> bool:
     """Whether all samples that both have, `other` after `shift` of `one`, are the same.
 
-    That is within half of the coarser step to which they are written.
+    That is within half of the coarser step to which they are written; or as well about another
+    zero and in another size, where they share their noise.
     """
     begin, end = max(shift, 0), min(len(one), shift + len(other))
     a, b = one[begin:end], other[begin - shift : end - shift]
@@ -130,12 +163,73 @@ def _same(one: Array, other: Array, shift: int) -> bool:
     apart = np.abs(a - b)
     if not apart.any():
         return True
-    if float(np.median(apart)) > _NEAR * float(b.std()):
+    if _near(apart, b) and any(_rounds(apart, written) for written in (a, b)):
+        return True
+    centred, other_centred = a - a.mean(), b - b.mean()
+    gain = float(centred @ other_centred) / float(centred @ centred)
+    apart = gain * centred - other_centred
+    if gain == 0.0 or not _near(np.abs(apart), b):
         return False
-    return any(
-        bool((apart <= (0.5 + _TIES) * _step(written) + _SINGLE * np.abs(written)).all())
-        for written in (a, b)
-    )
+    slack = _FITTED / np.sqrt(len(a))
+    return (
+        _rounds(np.abs(apart), b, slack) or _rounds(np.abs(apart) / abs(gain), a, slack)
+    ) and _noise_is_shared(apart, other_centred, command[begin:end])
+
+
+def _near(apart: Array, values: Array) -> bool:
+    return float(np.median(apart)) <= _NEAR * float(values.std())
+
+
+def _rounds(apart: Array, written: Array, slack: float = 0.0) -> bool:
+    """Whether values are apart by no more than half of the step to which one of them is written.
+
+    Args:
+        apart: by how much, (n,) [m].
+        written: that one of them, (n,) [m].
+        slack: by how many half steps zero and gain may be off [1]; 0 where none were fitted.
+    """
+
+    def within(part: slice, step: Array) -> bool:
+        rounded = (0.5 + _TIES) * step + _SINGLE * np.abs(written[part])
+        if slack:  # of the largest values: their digits decide how well zero and gain are known
+            rounded += slack * float(rounded.max()) + _EXACT * float(written.std())
+        return bool((apart[part] <= rounded).all())
+
+    # The step of a few values is no finer than that of all, and the largest is among these: most
+    # pairs of tests end here.
+    begin = max(0, int(np.abs(written).argmax()) - _LOOK // 2)
+    first = slice(begin, begin + _LOOK)
+    few = written[first]
+    if np.ptp(few) > 0.0 and not within(first, np.maximum(_step(few), _least(few))):
+        return False
+    return within(slice(None), _step(written))
+
+
+def _noise_is_shared(apart: Array, values: Array, command: Array) -> bool:
+    """Whether two channels have one noise: it is far more than what is left between them.
+
+    Noise is what neither earlier samples nor the command foretell; both are looked at through the
+    filter that leaves the least of one.
+
+    Args:
+        apart: one channel in the size of the other, less the other, (n,) [m].
+        values: the other, about its mean, (n,) [m].
+        command: what it followed, (n,) [m].
+    """
+    begin = max(0, (len(values) - _TAKEN) // 2)
+    part = slice(begin, begin + _TAKEN)
+    y, r, u = values[part], apart[part], command[part] - command[part].mean()
+    lags = min(_LAGS, len(y) // 10)
+    ahead = len(y) - max(lags, _BEFORE)
+    past = [y[len(y) - ahead - k : len(y) - k] for k in range(1, _BEFORE + 1)]
+    driven = [u[len(u) - ahead - k : len(u) - k] for k in range(lags)]
+    size = max(float(y.std()), 1e-300), max(float(u.std()), 1e-300)
+    basis = np.column_stack([*(c / size[0] for c in past), *(c / size[1] for c in driven)])
+    weights, *_ = np.linalg.lstsq(basis, y[-ahead:], rcond=None)
+    noise = y[-ahead:] - basis @ weights
+    own = [r[len(r) - ahead - k : len(r) - k] / size[0] for k in range(1, _BEFORE + 1)]
+    left = r[-ahead:] - np.column_stack(own) @ weights[:_BEFORE]
+    return bool(noise.std() > _NOISE * size[0] and left.std() < _SHARED * noise.std())
 
 
 def _changes(values: Array) -> int:
@@ -147,7 +241,7 @@ def _step(values: Array) -> Array:
 
     Zero where neither shows.
     """
-    least = float(np.diff(np.unique(values)).min())
+    least = _least(values)
     even = all(_whole((part - values[0]) / least) for part in (values[:_LOOK], values))
     steps = [np.full(len(values), least if even else 0.0)]
     for unit in _UNITS:
@@ -158,6 +252,11 @@ def _step(values: Array) -> Array:
                 steps.append(unit * _place(told, digits))
                 break
     return np.asarray(np.max(steps, axis=0))
+
+
+def _least(values: Array) -> float:
+    """Return the least difference of two values."""
+    return float(np.diff(np.unique(values)).min())
 
 
 def _place(told: Array, digits: int) -> Array:

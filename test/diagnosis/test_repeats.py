@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
+from actuator_glue.api.simulation import Sensors
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.repeats import refuse_known, refuse_repeats, sketch
 from actuator_glue.records import Array, Record
@@ -54,6 +55,45 @@ def test_a_copy_is_known_by_its_noise(copied: Callable[[Array], Array]) -> None:
         refuse_repeats([trial(2), ONE], [copy])
     with pytest.raises(InputError, match=r'the prior from monday\.npz was made'):
         refuse_known([trial(2), copy], [sketch(ONE)], 'monday.npz')
+
+
+@pytest.mark.parametrize(('gain', 'zero'), [(1.0, 1e-3), (-1.0, 0.0), (1.02, -2e-4)])
+@pytest.mark.parametrize('count', [6, None], ids=['6 digits', 'full'])
+def test_another_zero_sign_or_gain_is_no_other_test(
+    gain: float, zero: float, count: int | None
+) -> None:
+    """Both channels shifted and scaled, whole or in part; another test's copy is no copy."""
+
+    def made(record: Record) -> Record:
+        measured = gain * record.measured + zero
+        measured = measured if count is None else digits(measured, count)
+        command = gain * record.command + zero
+        return replace(record, command=command, measured=measured, source='copy')
+
+    for copy in (made(ONE), made(ONE).slice(700, 2900)):
+        for pair in ([ONE, copy], [copy, ONE]):
+            with pytest.raises(InputError, match='would count twice'):
+                refuse_repeats(pair)
+        with pytest.raises(InputError, match='it would judge itself'):
+            refuse_repeats([ONE], [copy])
+        with pytest.raises(InputError, match='the prior from monday'):
+            refuse_known([copy], [sketch(ONE)], 'monday.npz')
+    refuse_repeats([trial(2), made(ONE)])
+    refuse_known([made(ONE)], [sketch(trial(2))], 'monday.npz')
+
+
+@pytest.mark.parametrize('shape', ['sine', 'sweep', 'noise'])
+@pytest.mark.parametrize('count', [5, None], ids=['5 digits', 'full'])
+def test_machines_without_noise_are_no_copies(shape: str, count: int | None) -> None:
+    """A linear one moves alike in all sizes, and a sine alike whatever its parameters."""
+    made = []
+    for amplitude, stiffness in ((2e-3, 0.0), (1e-3, 0.0), (2e-3, 250e3), (2e-3, 260e3)):
+        command = ag.Command(shape, rate=250.0, duration=8.0, amplitude=amplitude)
+        quiet = Sensors(noise=0.0, force_noise=0.0)
+        test = ag.simulate(command, stiffness=stiffness, sensors=quiet)
+        measured = test.measured if count is None else digits(test.measured, count)
+        made.append(replace(test, measured=measured))
+    refuse_repeats(made)
 
 
 def test_every_second_sample_is_no_other_test() -> None:
