@@ -21,6 +21,7 @@ _DECIMALS = 6  # most digits behind the point to which stamps may have been roun
 # Rates closer than this are one rate to `clock_check`; a delay is off by the same share.
 _ONE_RATE = 0.01
 _TIES = 1e-6  # of a resolution: two stamps may be rounded from its two edges
+_NEAR = 1.0  # periods off an even clock: a walk of uneven steps goes farther
 _ENDS = 500  # stamps of each end that are compared: those far apart tell a rate best
 
 
@@ -180,7 +181,23 @@ def told_rate(low: float, high: float) -> float | None:
 
 
 def near_rate(time: Array) -> str:
-    """Return a round number of samples per second near the mean one of times [Hz]."""
+    """Return the rate of the clock that times may have, as a text [Hz].
+
+    Where they stay near an even clock it is the roundest rate that they cannot tell from that
+    clock's, else a round number of samples per second near the mean one.
+    """
+    index = np.arange(len(time))
+    passed = time - time[0]
+    period, first = (float(c) for c in np.polyfit(index, passed, 1))
+    off = passed - first - period * index
+    rounded = rounding(time)
+    if period > 0.0 and float(np.abs(off).max()) <= max(_NEAR * period, 1.1 * rounded):
+        # A slope by least squares; stamps that are rounded are not off by chance.
+        error = float(off.std()) * np.sqrt(12.0) / (period * len(time) ** 1.5)
+        share = 3.0 * error + min(rounded / period, 1.0) / len(time)
+        found = told_rate((1.0 - share) / period, (1.0 + share) / period)
+        if found is not None:
+            return f'{found:.10g}'
     rate = (len(time) - 1) / float(time[-1] - time[0])
     return f'{rate:.2g}' if rate < 99.5 else f'{round(rate, -1):.0f}'
 

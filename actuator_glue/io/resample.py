@@ -37,10 +37,19 @@ _MOST: dict[By, float] = {'band-limited': 10.0, 'lines': 2.0}
 _STRAIGHT = 2e-3
 _LONGEST_STEP = 5.0  # median steps without a sample: beyond it is a gap, not jitter
 _KEPT = 0.95  # share of its amplitude that a sine keeps in the reported band
-# Stamps that stay within this many steps of an even clock may be a log's, the samples being even;
-# they are if that clock lowers the misfit between neighbours to less than this share.
+# Stamps that stay within this many steps of an even clock, or within what they are rounded to, may
+# be a log's, the samples being even; they are if that clock lowers the misfit between neighbours
+# to less than this share, and no sample is missing.
 _BESIDE = 5.0
 _BETTER = 0.7
+# A lost sample moves all later stamps by a period: the means of stamps before and behind it show a
+# step, of so many stamps that those of their jitter are this many times smaller.
+_LOST = 0.6  # periods
+_SURE = 6.0
+_AROUND = 16  # stamps at least
+_ROUNDED = 1.02  # of a rounding step
+_BLOCK = 100  # stamps of which the earliest and the latest are looked at
+_ROUGH = 1.4826  # from the median deviation to a standard one
 # Times are reported to be off if that causes this share of the misfit between neighbours, and they
 # are off by more than this share of a step.
 _FELT, _EXACT = 0.1, 1e-3
@@ -161,8 +170,8 @@ def resample_evenly(
 
     Raises:
         InputError: times that are no numbers, go back, or stand still where the samples are not
-            even, or do not tell whose clock that is; a gap; or a rate far from that of the
-            samples.
+            even, or do not tell whose clock that is; a gap, or samples that are missing of even
+            ones; or a rate far from that of the samples.
     """
     one_of(by, 'resampling by', get_args(By))
     time = values['time']
@@ -299,7 +308,7 @@ def _even_clock(
 
     Raises:
         InputError: stamps that stand still and allow clocks far apart, none of them at the rate
-            that is asked for.
+            that is asked for; or samples that are missing.
     """
     none = np.empty(0), ''
     if len(time) < 16 or not np.isfinite(time).all() or np.diff(time).min() < 0.0:
@@ -310,19 +319,91 @@ def _even_clock(
     # A random walk of steps departs from any clock, a log returns to its own; stamps in whole
     # seconds are off theirs by a second at most.
     rounded = rounding(time)
-    if period <= 0.0 or float(np.abs(off).max()) > max(_BESIDE * period, 1.1 * rounded):
+    if period <= 0.0:
         return none
-    if np.diff(time).min() == 0.0:
+    stands = bool(np.diff(time).min() == 0.0)
+    if float(np.abs(off).max()) > max(_BESIDE * period, 1.1 * rounded):
+        if stands:  # neither these stamps nor an even clock can be taken
+            _refuse_lost(time, period * index, where)
+        return none
+    if stands:
         step, told = _repeated(time, rate, where)
-        return np.asarray(step * index), told
+        even = np.asarray(step * index)
+        _refuse_lost(time, even, where)
+        return even, told
     step = near_whole_rate(float(period), len(time))
     # The rate that is asked for is the controller's where the stamps cannot tell the two apart.
     if abs(1.0 / rate - period) * len(time) < max(rounded, period):
         step = 1.0 / rate
     even = np.asarray(step * index)
     column = channels['command']
-    smoother = _smooth(even, column) < _BETTER * _smooth(time, column)
-    return (even, f'of {1.0 / step:.6g} Hz') if smoother else none
+    if not _smooth(even, column) < _BETTER * _smooth(time, column):
+        return none
+    _refuse_lost(time, period * index, where)
+    return even, f'of {1.0 / step:.6g} Hz'
+
+
+def _refuse_lost(time: Array, even: Array, where: str) -> None:
+    """Refuse an even clock for samples of which some are missing, or there twice.
+
+    Args:
+        time: stamps, (n,) [s].
+        even: times by the clock, (n,) [s].
+        where: file, for messages.
+
+    Raises:
+        InputError: from one sample to the next the stamps step away from the clock for good.
+    """
+    off, period, count = time - time[0] - even, float(even[1] - even[0]), len(time)
+    if _least_range(even, off) <= _ROUNDED * rounding(time):
+        return  # a clock beside the step of its stamps slips by one of them now and then
+    jitter = float(np.std(np.diff(off))) / np.sqrt(2.0)
+    around = max(_AROUND, int(np.ceil(2.0 * (_SURE * jitter / (_LOST * period)) ** 2)))
+    if 2 * around > count:
+        return  # so few stamps that are off so far show no lost sample
+    sums = np.cumsum(np.append(0.0, off))
+    at = np.arange(1, count)  # the first sample behind a place
+    before, behind = np.minimum(at, around), np.minimum(count - at, around)
+    step = (sums[at + behind] - sums[at]) / behind - (sums[at] - sums[at - before]) / before
+    # Stamps that wander, as of a log written in bursts, have many such steps.
+    wander = _ROUGH * float(np.median(np.abs(step - np.median(step))))
+    spread = jitter * np.sqrt(1.0 / before + 1.0 / behind)
+    least = np.maximum(_LOST * period, _SURE * np.maximum(spread, wander))
+    beyond = np.abs(step) / least
+    first = int(beyond.argmax())
+    if beyond[first] <= 1.0:
+        return
+    near = slice(max(0, first - around // 4), first + around // 4 + 1)
+    moved = np.diff(off)[near] * np.sign(step[first])
+    place = near.start + int(moved.argmax())
+    many = abs(float(step[first])) / period
+    what = 'missing' if step[first] > 0.0 else 'there twice'
+    raise InputError(
+        f'{where}: about {max(round(many), 1)} sample(s) are {what} after sample {place} '
+        f'({time[place]:.9g} s): from there on the stamps are {1e3 * abs(step[first]):.2g} ms off '
+        'the even clock before; cut the record there, and give the parts as records of their own'
+    )
+
+
+def _least_range(even: Array, off: Array) -> float:
+    """Return the range of deviations from the even clock that makes it least [s].
+
+    Args:
+        even: times by another clock, (n,) [s].
+        off: deviations from it, (n,) [s].
+    """
+    begins = np.arange(0, len(off), _BLOCK)
+    ends = np.concatenate([np.maximum.reduceat(off, begins), np.minimum.reduceat(off, begins)])
+    at = np.tile(even[begins], 2)
+
+    def spread(slope: float) -> float:
+        return float(np.ptp(ends - slope * at))
+
+    most = 2.0 * float(np.ptp(off)) / float(even[-1])
+    found = scipy.optimize.minimize_scalar(
+        spread, bounds=(-most, most), method='bounded', options={'xatol': 1e-6 * most}
+    )
+    return min(float(found.fun), spread(0.0))
 
 
 def _repeated(time: Array, rate: float, where: str) -> tuple[float, str]:

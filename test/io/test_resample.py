@@ -8,6 +8,7 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
+from actuator_glue.even_times import uniform_period
 from actuator_glue.io.load import load_records
 from actuator_glue.io.resample import resample_evenly
 
@@ -109,6 +110,41 @@ def test_stamps_beside_even_samples_give_way_to_an_even_clock(late: str) -> None
     assert 'an even clock was taken in place of them' in made.told()
     # What was taken at uneven times is no log of even samples.
     assert resample_evenly(channels(TIME, TIME, 1e-5), 27, where='x').late == 0.0
+
+
+@pytest.mark.parametrize('lost', [1, 8])
+@pytest.mark.parametrize(
+    ('rate', 'late'), [(800.0, 0.0), (120.0, 0.0), (512.0, 0.0), (800.0, 1.5e-3)]
+)
+def test_no_even_clock_is_taken_where_samples_are_missing(
+    rate: float, late: float, lost: int
+) -> None:
+    """Stamps in milliseconds, of a log perhaps: what is lost moves all later ones for good."""
+    true = np.delete(0.3 + np.arange(COUNT + lost) / rate, slice(1500, 1500 + lost))
+    stamps = true + np.random.default_rng(8).uniform(0.0, late, COUNT)
+    stamps = np.sort(np.round(stamps, 3))
+    with pytest.raises(InputError, match=r'missing after sample|without samples after') as caught:
+        resample_evenly(fast(stamps, true), rate, where='x')
+    place = int(str(caught.value).partition('after sample ')[2].split()[0])
+    assert abs(place - 1499) <= (8 if late else 1)
+
+
+@pytest.mark.parametrize('rate', [997.0, 512.0, 640.0, 2000.0])
+def test_a_clock_beside_that_of_its_stamps_lacks_nothing(rate: float) -> None:
+    """Its stamps slip by a millisecond now and then; the rate that is proposed is the clock's."""
+    true = 0.3 + np.arange(COUNT) / rate
+    stamps = np.round(true, 3)
+    made = resample_evenly(fast(stamps, true), rate, where='x')
+    assert made.late < 0.5e-3 and f'of {rate:.6g} Hz' in made.clock
+    if rate == 512.0:
+        with pytest.raises(InputError, match='periods off an even clock; --resample 512 makes'):
+            uniform_period(stamps, 'x')
+
+
+def fast(stamps: np.ndarray, true: np.ndarray) -> dict[str, np.ndarray]:
+    """Return a sweep that moves far within a millisecond."""
+    moved = 5e-3 * np.sin(2.0 * np.pi * (0.1 + 0.2 * true) * true)
+    return {'time': stamps, 'command': moved, 'measured': moved}
 
 
 def test_a_clock_that_the_stamps_rule_out_is_not_taken() -> None:
