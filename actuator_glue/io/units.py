@@ -52,6 +52,44 @@ _LOWER = {unit.lower() for unit in _KNOWN}
 _SIZES = {unit: (unit, 1.0) for unit in _KNOWN} | MOTIONS
 _SIZES |= {u: (what, f) for what in ('time', 'measured', 'force') for u, f in ROLES[what].items()}
 _SIZES |= {unit: ('torque', f) for unit, f in TORQUES.items()}
+# Units as words, in any capitals and in the plural too, and their symbols.
+_WORDS = {
+    'meter': 'm',
+    'metre': 'm',
+    'millimeter': 'mm',
+    'millimetre': 'mm',
+    'centimeter': 'cm',
+    'centimetre': 'cm',
+    'micrometer': 'um',
+    'micrometre': 'um',
+    'micron': 'um',
+    'inch': 'in',
+    'inche': 'in',  # inches
+    'newton': 'N',
+    'kilonewton': 'kN',
+    'meganewton': 'MN',
+    'second': 's',
+    'millisecond': 'ms',
+    'microsecond': 'us',
+    'nanosecond': 'ns',
+    'degree': 'deg',
+    'radian': 'rad',
+    'milliradian': 'mrad',
+    'revolution': 'rev',
+    'volt': 'V',
+    'millivolt': 'mV',
+    'milliampere': 'mA',
+    'milliamp': 'mA',
+    'percent': '%',
+    'count': 'counts',
+    'newtonmeter': 'Nm',
+    'newtonmetre': 'Nm',
+}
+# What stands in the place of a unit and is none.
+_NONE = frozenset(
+    ('', '1', '?', 'none', 'n/a', 'na', 'nan', 'null', 'nil', 'unknown', 'undefined')
+)
+_NONE |= {'unitless', 'dimensionless', 'no unit', 'not set', 'a.u.', 'arb', 'user'}
 _PLACE = re.compile(r'[\d:,\s]*')  # in brackets: which column of a matrix
 
 
@@ -167,13 +205,38 @@ def written_unit(name: str) -> str:
     return (units or capitals or [str(text) for text in inside] or [''])[-1]
 
 
+def symbol(unit: str) -> str:
+    """Return the symbol of a unit that may be a word: `Inches`, `meters`, `seconds since 1970`.
+
+    A symbol stays as it is, in its capitals, and so does what is not understood; what is no unit
+    (a dash, `none`) is empty.
+    """
+    bare = unit.strip(' \t[]()').strip()
+    if bare in _KNOWN:
+        return bare
+    plain = bare.casefold()
+    if plain in _NONE or not plain.strip('-\u2013\u2014_.* '):
+        return ''
+    plain = re.sub(r'\s+since\b.*|[\s-]', '', plain)
+    return _WORDS.get(plain.removesuffix('s'), _WORDS.get(plain, bare))
+
+
 def contradict(named: str, stated: str) -> bool:
     """Return whether the unit in a column's name and what the file gives as its unit differ.
 
-    Units that are not known here, and spellings of one unit, contradict nothing.
+    Spellings of one unit contradict nothing, nor does anything beside a name without a unit that
+    is known here. What the file gives and is not understood differs from any unit of a name,
+    unless only its capitals do: those of `M` and `m` are a factor of a billion.
     """
-    both = [_SIZES.get(unit.strip(' []()')) for unit in (named, stated)]
-    return None not in both and both[0] != both[1]
+    named, stated = symbol(named), symbol(stated)
+    known, other = _SIZES.get(named), _SIZES.get(stated)
+    if known is None or not stated:
+        return False
+    if other is not None:
+        return known != other
+    if named.casefold() != stated.casefold():
+        return True
+    return not stated.isupper() and {named[0], stated[0]} == {'m', 'M'}
 
 
 def units_line(entries: list[str]) -> list[str]:
@@ -184,7 +247,7 @@ def units_line(entries: list[str]) -> list[str]:
     known = ANGLES.union(*ROLES.values())
     units = [entry.strip().strip('[]()').strip() for entry in entries]
     short = all(len(u) <= 12 and not _is_number(u) for u in units)
-    return units if short and any(u in known for u in units) else []
+    return units if short and any(symbol(u) in known for u in units) else []
 
 
 def _is_number(text: str) -> bool:
@@ -224,7 +287,7 @@ def choose(
                 f'{where}: two columns are called {role}, {first!r} and {name.strip()!r}; keep '
                 'one, or name the one that is meant in a channel map'
             )
-        written[role] = unit or stated
+        written[role] = symbol(unit or stated)
         place = f'{where}: column {name.strip()!r}'
         if contradict(unit, stated):
             raise InputError(

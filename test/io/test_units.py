@@ -11,7 +11,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.look import look
-from actuator_glue.io.units import recognise, written_unit
+from actuator_glue.io.units import contradict, recognise, symbol, written_unit
 from actuator_glue.motion import MOTIONS
 
 COUNT = 1000
@@ -107,6 +107,14 @@ def test_a_unit_of_something_else_is_named(
         ('[s],[mm],[in]', "'measured_mm' .* 'in'"),
         ('s,mm,V', "'measured_mm' .* 'V'"),
         ('s,mm,mm/s', "'measured_mm' .* 'mm/s'"),
+        ('s,mm,Volts', "'measured_mm' .* 'Volts'"),
+        ('s,mm,Inches', "'measured_mm' .* 'Inches'"),
+        ('s,meters,mm', "'command_mm' .* 'meters'"),
+        ('s,METRES,mm', "'command_mm' .* 'METRES'"),
+        ('s,mm,Degrees', "'measured_mm' .* 'Degrees'"),
+        ('s,mm,Newtons', "'measured_mm' .* 'Newtons'"),
+        ('s,mm,Mm', "'measured_mm' .* 'Mm'"),
+        ('s,mm,furlong', "'measured_mm' .* 'furlong'"),
     ],
 )
 def test_units_that_contradict_are_refused(tmp_path: Path, units: str, said: str) -> None:
@@ -135,14 +143,59 @@ def test_units_in_a_file_contradict_its_names(
 
 
 @pytest.mark.parametrize(
-    'units', ['s,mm,mm', 'sec,mm,mm', 's,mm,', '[s],[mm],-', 's,mm,Millimeter']
+    'units',
+    [
+        's,mm,mm',
+        'sec,mm,mm',
+        's,mm,',
+        '[s],[mm],-',
+        's,mm,Millimeter',
+        'Seconds,MILLIMETRES,(mm)',
+        's,MM,n/a',
+        's,none,mm',
+    ],
 )
 def test_units_said_twice_alike_are_read(tmp_path: Path, units: str) -> None:
-    """Another spelling of a unit, none, or one that is not known contradicts nothing."""
+    """Another spelling of a unit, or none, contradicts nothing."""
     path = table(tmp_path / 'a.csv', ['time_s', 'command_mm', 'measured_mm'])
     names, rows = path.read_text().split('\n', 1)
     path.write_text(f'{names}\n{units}\n{rows}')
     np.testing.assert_allclose(read(path).measured, MEASURED * 1e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ('written', 'meant'),
+    [
+        ('Meters', 'm'),
+        ('Inches', 'in'),
+        ('Kilonewtons', 'kN'),
+        ('seconds since 1970-01-01', 's'),
+        ('MN', 'MN'),
+        ('mN', 'mN'),
+        ('--', ''),
+        ('furlong', 'furlong'),
+    ],
+)
+def test_words_are_units_in_any_capitals_and_symbols_in_their_own(
+    written: str, meant: str
+) -> None:
+    """A word has no other meaning in capitals; `mN` is no meganewton, and is not guessed."""
+    assert symbol(written) == meant
+    assert contradict('kN', written) == (meant not in ('kN', ''))
+
+
+def test_a_unit_that_a_file_spells_out_holds_where_the_name_has_none(tmp_path: Path) -> None:
+    """An attribute `meters` of a dataset `command`."""
+    path = tmp_path / 'a.h5'
+    columns = {'time': (TIME, 'Seconds'), 'command': (COMMAND, 'Millimeters')}
+    columns['measured'] = (1e-3 * MEASURED, 'meters')
+    with h5py.File(path, 'w') as file:
+        for name, (values, unit) in columns.items():
+            file[name] = values
+            file[name].attrs['units'] = unit
+    record = read(path)
+    np.testing.assert_allclose(record.command, COMMAND * 1e-3, atol=1e-9)
+    np.testing.assert_allclose(record.measured, MEASURED * 1e-3, atol=1e-9)
 
 
 def test_a_pipe_parts_columns(tmp_path: Path) -> None:
