@@ -34,6 +34,10 @@ def test_capitals_and_colons_are_read(tmp_path: Path, sign: str) -> None:
     ('note', 'said'),
     [
         ('stiffness = 250e3', '`stiffness_N_per_m = VALUE`, which is the specimen stiffness'),
+        ('stiffness: 250e3', 'stiffness_N_per_m'),
+        ('Stiffness [kN/m]: 250', 'stiffness_N_per_m'),
+        ('hold type: linear', '`hold = VALUE`'),
+        ('command hold: zero order', '`hold = VALUE`'),
         ('Stiffness [N/m] = 250e3', 'stiffness_N_per_m'),
         ('specimen stiffness = 250e3', 'stiffness_N_per_m'),
         ('stiffness_kN_per_mm = 0.25', 'stiffness_N_per_m'),
