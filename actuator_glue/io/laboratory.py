@@ -201,6 +201,8 @@ def _by_name(
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
     notes, period, start_ns = noted(table.notes, str(path)), table.period, table.start_ns
+    if period is not None and 'time' in values:
+        _check_period(period, values['time'], path)
     del raw, table  # a long file's columns as they were read are not held beside these
     return values, notes, None if 'time' in values else period, start_ns, motion
 
@@ -268,6 +270,27 @@ def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -
     if clocks:
         raise InputError(
             f'{path}: {disagreement(rate, clocks)}; take `rate` out of the channel map, or mend it'
+        )
+
+
+def _check_period(period: float, time: Array, path: Path) -> None:
+    """Refuse a file whose column of times contradicts the clock that it states besides.
+
+    Args:
+        period: that the file states [s].
+        time: times of the samples [s].
+        path: for messages.
+
+    Raises:
+        InputError: more than 1 % apart.
+    """
+    # In units of periods: the comparison wants two seconds of any rate.
+    found = rate_by_clock(np.arange(len(time)), time / period, 1.0)
+    if found is not None:
+        clocks = {'its column of times': found / period}
+        raise InputError(
+            f'{path}: {disagreement(1.0 / period, clocks)}; mend the one '
+            'that is wrong, or name the column in a channel map as `time`'
         )
 
 

@@ -108,6 +108,56 @@ def test_waveforms_of_tdms_without_common_times_are_refused(
         read(path)
 
 
+def parts(path: Path, *behind: float, period: float = 1e-3) -> Path:
+    """Write waveforms in segments of half of the samples, each so many samples after the first."""
+    with TdmsWriter(path) as writer:
+        for begin, start in zip((0, COUNT // 2), behind, strict=True):
+            part = slice(begin, begin + COUNT // 2)
+            own = waveform(start=later(start), period=period if begin else 1e-3)
+            writer.write_segment(
+                [
+                    ChannelObject('run', 'command_mm', COMMAND[part], own),
+                    ChannelObject('run', 'measured_mm', MEASURED[part], own),
+                ]
+            )
+    return path
+
+
+def test_segments_of_tdms_that_go_on_are_one_record(tmp_path: Path) -> None:
+    """Each with its own start, or all with the first one: the record begins with the first."""
+    for second in (COUNT // 2, COUNT // 2 + 0.1, 0):
+        record = read(parts(tmp_path / 'a.tdms', 0, second))
+        assert record.start_ns == START_NS
+        assert np.array_equal(record.command, 1e-3 * COMMAND)
+
+
+def test_segments_of_tdms_that_begin_anew_are_refused(tmp_path: Path) -> None:
+    """A minute or a sample later, or at another rate: no record is joined over that."""
+    half = COUNT // 2
+    for second in (half + 60_000, half + 1, half - 1):
+        with pytest.raises(InputError, match=f'command_mm begins anew at sample {half}, .*each'):
+            read(parts(tmp_path / 'a.tdms', 0, second))
+    with pytest.raises(InputError, match=f'every 0.002 s from sample {half} on'):
+        read(parts(tmp_path / 'a.tdms', 0, half, period=2e-3))
+
+
+def test_times_of_tdms_that_its_waveforms_contradict_are_refused(tmp_path: Path) -> None:
+    """A column of times at 500 Hz beside waveforms of 1 kHz; a map may say which counts."""
+    path = tmp_path / 'a.tdms'
+    for step in (1e-3, 2e-3):
+        times = step * np.arange(COUNT)
+        write_tdms(
+            path,
+            ('time_s', times, {}),
+            ('command_mm', COMMAND, waveform()),
+            ('measured_mm', MEASURED, waveform()),
+        )
+        if step == 1e-3:
+            assert read(path).period == step
+    with pytest.raises(InputError, match=r'said to be 1000 Hz, but by its column of times .* 500'):
+        read(path)
+
+
 def test_waveforms_of_tdms_whose_increments_differ_in_their_last_digits(tmp_path: Path) -> None:
     """Increments that were divided by another number are one clock, asked for or not."""
     path = write_tdms(

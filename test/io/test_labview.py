@@ -139,6 +139,7 @@ def test_where_time_begins(tmp_path: Path) -> None:
         ({'Time': ('10:00:00', '10:00:01')}, 'Time differs between channels'),
         ({'X_Dimension': ('Frequency', 'Frequency')}, 'over Frequency, not over time'),
         ({'Delta_X': ''}, 'Delta_X is .*no column of times'),
+        ({'Samples': ('4000', '4000')}, 'Samples is 4000, and 2000 rows follow: the file is cut'),
     ],
 )
 def test_channels_without_a_common_clock_are_refused(
@@ -147,6 +148,24 @@ def test_channels_without_a_common_clock_are_refused(
     """Other steps, other starts, no time at all."""
     with pytest.raises(InputError, match=words):
         read(labview(tmp_path / 'a.lvm', channels=changed))
+
+
+@pytest.mark.parametrize(
+    ('x', 'changed', 'words'),
+    [
+        ('One', {'X0': ('0.0', '0.1')}, 'X0 differs between channels'),
+        ('One', {'Delta_X': ('0.001', '0.001')}, 'Delta_X is 0.001, but X_Value goes up by 0.002'),
+        ('Multi', {'Delta_X': ('0.004', '0.004')}, 'Delta_X is 0.004, but .* up by 0.002'),
+        ('One', {'Samples': ('4000', '4000')}, 'Samples is 4000, and 2000 rows follow'),
+    ],
+)
+def test_a_column_of_times_that_the_heading_contradicts_is_refused(
+    tmp_path: Path, x: str, changed: dict, words: str
+) -> None:
+    """Nobody knows which is wrong; a heading of an appended file counts its first rows alone."""
+    with pytest.raises(InputError, match=words):
+        read(labview(tmp_path / 'a.lvm', x=x, channels=changed))
+    check(labview(tmp_path / 'b.lvm', x=x, channels={'Samples': ('100', '100')}))
 
 
 def segments(path: Path, x: str, starts: list[float], *, again: bool = False, **changed) -> Path:

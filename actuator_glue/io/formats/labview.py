@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from actuator_glue.clock_check import rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, delimited
@@ -137,6 +138,7 @@ def _clock(
         period = _number(path, segment, 'Delta_X', shown)
         first = _number(path, segment, 'X0', shown)
         own = first + period * np.arange(segment.rows, dtype=np.float64)
+        _check_count(path, segment, shown)
     elif not times:
         raise InputError(
             f'{path}: X_Columns is {said.file.get("X_Columns", "One")}, but no column is called '
@@ -149,10 +151,50 @@ def _clock(
                 f'{path}: the channels have times of their own, and they differ; bring them to '
                 'common times, and save them with one X column'
             )
+        _check_count(path, segment, shown)
+        _check_clock(path, said, segment, shown, own)
     if own[0] > _EPOCH:
         return _SegmentTimes(own, -_EPOCH * 10**9, False)
     start_ns = _stamp_ns(path, said, segment, shown)
     return _SegmentTimes(own, start_ns, start_ns > 0)
+
+
+def _check_count(path: Path, segment: _HeadedRows, shown: list[int]) -> None:
+    """Refuse rows of which the last are missing; more than are said are appended ones.
+
+    Raises:
+        InputError: fewer than the heading says.
+    """
+    stated = [int(n) for n in _of_channels(segment, 'Samples', shown) if n.isdecimal()]
+    if stated and segment.rows < max(stated):
+        raise InputError(
+            f'{path}: Samples is {max(stated)}, and {segment.rows} rows follow: the file is cut '
+            'off; copy it anew, or mend that line if all is there'
+        )
+
+
+def _check_clock(
+    path: Path, said: _Heading, segment: _HeadedRows, shown: list[int], times: Array
+) -> None:
+    """Refuse a column of times that the heading contradicts.
+
+    Raises:
+        InputError: Delta_X is another step, or channels of one column begin at different times.
+    """
+    for name in ('Delta_X', 'X0') if said.file.get('X_Columns', 'One').lower() == 'one' else ():
+        _common(path, segment, name, shown)
+    for text in set(_of_channels(segment, 'Delta_X', shown)) - {''}:
+        try:
+            step = float(text.replace(',', '.'))
+        except ValueError:
+            continue
+        # In units of steps: the comparison wants two seconds of any rate.
+        rate = rate_by_clock(np.arange(len(times)), times / step, 1.0) if step > 0.0 else None
+        if rate is not None:
+            raise InputError(
+                f'{path}: Delta_X is {text}, but {_TIMES} goes up by {step / rate:.6g}; mend the '
+                'one that is wrong'
+            )
 
 
 def _joined(path: Path, clocks: list[_SegmentTimes], scale: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,10 @@ from actuator_glue.records import Array, same_period
 _NAME = 'a LabVIEW TDMS file'
 # Starts that differ by whole samples, up to this share of a sample, are of one clock.
 _SAME = 0.02
+# A waveform goes on where a later segment begins this near its next sample [1]: computers and
+# converters count seconds of their own, and a lost sample is a whole one.
+_GOES_ON = 0.25
+_WAVE = ('wf_start_time', 'wf_start_offset', 'wf_increment')
 # LabVIEW's time zero: the start of a waveform that was given none.
 _UNKNOWN = np.datetime64('1904-01-01T00:00:00', 'us')
 
@@ -39,8 +44,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     # that is none it prints all bytes. Its loggers have levels and a handler of their own.
     library('nptdms.log', path).log_manager.set_level(logging.CRITICAL)
     size = path.stat().st_size
+    said = _said(path)
     columns: list[Column] = []
     clocks: list[_Clock] = []
+    broken: list[str] = []
     stamps: set[int] = set()
     with reading(path, _NAME), tdms.open(path) as file:
         notes = {str(name): str(value) for name, value in file.properties.items()}
@@ -60,10 +67,15 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     label, unit = bare(label), 's'
                     stamps.add(len(columns))
                 columns.append(Column(name, label, unit))
-                clocks.append(_clock(channel))
+                clock, fault = _whole(_clock(channel), said.get(channel.path, []))
+                clocks.append(clock)
+                broken.append(fault)
     if not columns:
         raise InputError(f'{path}: no channel of numbers in this TDMS file')
     asked = _asked(columns, channels)
+    fault = next((broken[i] for i in asked if broken[i]), '')
+    if fault:
+        raise InputError(f'{path}: {fault}; save each part as a file of its own')
     cuts, period, start_ns = _common(clocks, asked, path)
     if any(i in stamps for i in asked):
         start_ns = 0  # times of such a column are absolute
@@ -77,20 +89,90 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     return FileTable(columns, notes, values, period, start_ns)
 
 
+def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
+    """Return what segments say of waveforms, by channel: behind how many values, and what.
+
+    npTDMS keeps what the last segment says, and a start belongs to the first sample behind it.
+    """
+    reader = library('nptdms.reader', path).TdmsReader
+    found: dict[str, list[tuple[int, dict[str, Any]]]] = {}
+
+    class Watched(reader):  # type: ignore[misc,valid-type]  # an optional library's
+        """Reads the segments' headings, and keeps what each one says."""
+
+        def _update_object_metadata(self, segment: Any) -> None:
+            self.before = {name: o.num_values for name, o in self.object_metadata.items()}
+            super()._update_object_metadata(segment)
+
+        def _update_object_properties(self, properties: Any) -> None:
+            for name, pairs in (properties or {}).items():
+                own = {key: value for key, value in pairs if key in _WAVE}
+                if own:
+                    found.setdefault(name, []).append((self.before.get(name, 0), own))
+            super()._update_object_properties(properties)
+
+    with reading(path, _NAME), path.open('rb') as file:
+        Watched(file).read_metadata()
+    return found
+
+
+def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock, str]:
+    """Return the clock of a waveform from its first sample on, and what breaks it, in words.
+
+    Args:
+        last: as the last segment has it.
+        said: what each segment says of it.
+    """
+    first = previous = last
+    at = 0  # values before what was said last
+    now: dict[str, Any] = {}
+    for before, own in said:
+        known, now = now, {**now, **own}
+        clock = _of_properties(last.name, now, last.length)
+        # What is said behind all samples, when a file is closed, is of all of them.
+        if not known or not before or before >= last.length:
+            first = previous = clock
+            continue
+        if now == known:
+            continue  # every segment may repeat what the first one says
+        if not same_period(previous.period, clock.period):
+            return first, (
+                f'{last.name} has a sample every {previous.period:.9g} s, and every '
+                f'{clock.period:.9g} s from sample {before} on'
+            )
+        if (previous.start_ns is None) != (clock.start_ns is None):
+            return first, f'{last.name} has a start of its own from sample {before} on'
+        passed = ((clock.start_ns or 0) - (previous.start_ns or 0)) * 1e-9
+        late = passed + clock.offset - previous.offset - (before - at) * clock.period
+        if abs(late) > _GOES_ON * clock.period:
+            how = 'after' if late > 0.0 else 'before'
+            return first, (
+                f'{last.name} begins anew at sample {before}, {abs(late):.6g} s {how} the samples '
+                'before it end'
+            )
+        previous, at = clock, before
+    return first, ''
+
+
 def _clock(channel: Any) -> _Clock:
     """Return the times of a channel, as LabVIEW's waveforms have them."""
-    properties = channel.properties
+    return _of_properties(channel.name, channel.properties, len(channel))
+
+
+def _of_properties(name: str, properties: Mapping[str, Any], length: int) -> _Clock:
     period = float(properties.get('wf_increment', 0.0))
-    start = properties.get('wf_start_time')
+    start: Any = properties.get('wf_start_time')
+    if hasattr(start, 'as_datetime64'):
+        start = start.as_datetime64('us')
     known = isinstance(start, np.datetime64) and start != _UNKNOWN and not np.isnat(start)
     return _Clock(
-        channel.name,
+        name,
         period if period > 0.0 else 0.0,
         float(
             np.nan_to_num(float(properties.get('wf_start_offset', 0.0)), posinf=0.0, neginf=0.0)
         ),
         int(start.astype('datetime64[ns]').astype(np.int64)) if known else None,
-        len(channel),
+        length,
     )
 
 
