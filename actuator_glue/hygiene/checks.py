@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,9 @@ _OFF = 5.0
 _SOFTEST = 2e3
 # Amplitude of slow motion that the most leakage of Table 3 leaves under 1 MN/m.
 _DROOPS = 0.08
+# Share by which a force that is well told may differ from the stated stiffness without a remark: a
+# load cell's factor and a specimen's curvature are within it.
+_BESIDE = 0.2
 _TELLING = 0.8  # share of the force's variance that displacement and acceleration must explain
 _SURE = 5.0  # standard deviations: noise of a load cell is not quite white
 _SEPARATE = 0.1  # share of the displacement's variance that acceleration must leave
@@ -180,6 +184,27 @@ def pull(record: Record) -> float | None:
     """Return force over displacement [N/m], with its sign; None where that explains no force."""
     found = _regressed(record)
     return found.weight if found is not None and found.explained else None
+
+
+def beside_stated(records: Sequence[Record]) -> list[str]:
+    """Return a sentence on each record whose force tells another stiffness than was given.
+
+    Only where a mass cannot stand behind it, and the difference is beyond what noise makes.
+    """
+    out = []
+    for i, record in enumerate(records):
+        stated, found = record.stiffness, _regressed(record)
+        if not stated or found is None or not (found.explained and found.separate):
+            continue
+        seen = abs(found.weight)
+        if abs(seen - stated) - _SURE * found.error > _BESIDE * stated:
+            out.append(
+                f'{where(record, i + 1)}: force over displacement tells a specimen stiffness of '
+                f'{seen:.3g} N/m, and {stated:.3g} N/m is given; check which one holds '
+                '(--stiffness, in N/m and in the order of the records), the unit of the force '
+                'channel, and whether the specimen yields'
+            )
+    return out
 
 
 def most_push(record: Record) -> float | None:

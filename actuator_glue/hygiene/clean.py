@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.hygiene import glitches, slow_channel
-from actuator_glue.hygiene.checks import check, where
+from actuator_glue.hygiene.checks import beside_stated, check, where
 from actuator_glue.hygiene.repeats import refuse_repeats
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
@@ -88,7 +88,8 @@ def clean(
     """Check records, fill channels slower than the recorder, zero them, remove command glitches.
 
     Returns:
-        The records in the order given, held-out ones last, and what was done, for people.
+        The records in the order given, held-out ones last, and what was done or seems doubtful,
+        for people.
 
     Raises:
         InputError: a record that cannot be fitted, given twice, or fitted and held out.
@@ -97,9 +98,10 @@ def clean(
     for i, record in enumerate(every):
         check(record, i + 1)
     refuse_repeats(records, holdout)
+    stiffnesses = beside_stated(every)
     every, notes = slow_channel.measured_filled(every)
     every, more = zeroed(every)
     initials = [initial_state(r) for r in every]
     every, filled = slow_channel.command_filled(every, initials)
     every, glitches_told = glitches.mended(every, initials)
-    return every, [*glitches_told, *notes, *filled, *more]
+    return every, [*stiffnesses, *glitches_told, *notes, *filled, *more]

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import scipy
 
+import actuator_glue as ag
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import check
-from actuator_glue.hygiene.clean import initial_state
+from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.records import Record
 
@@ -203,3 +204,24 @@ def test_a_slow_amplitude_far_from_one_is_told() -> None:
     slow = scipy.signal.lfilter([0.002], [1.0, -0.998], U)  # a bandwidth of 0.08 Hz
     assert not suspicions([amplified(1.0, 0.0), replace(GOOD, measured=slow)])
     check(replace(GOOD, measured=slow))
+
+
+@pytest.mark.parametrize(
+    ('stated', 'told'), [(250e3, 0), (225e3, 0), (290e3, 0), (125e3, 1), (600e3, 1), (0.0, 0)]
+)
+def test_a_stiffness_beside_that_of_the_force_is_told(stated: float, told: int) -> None:
+    """A factor of two is no refusal, and no silence; a tenth is a load cell's."""
+    record = ag.simulate(
+        ag.Command(rate=250.0, duration=8.0, high=6.0),
+        stiffness=250e3 if stated else 0.0,
+        seed=3,
+    )
+    _, notes = clean([replace(record, stiffness=stated)])
+    found = [note for note in notes if 'force over displacement tells' in note]
+    assert len(found) == told
+    assert all(f'2.5e+05 N/m, and {stated:.3g} N/m is given' in note for note in found)
+    # A force that shows little tells nothing.
+    noise = np.random.default_rng(4).normal(0.0, 2.0 * np.std(record.force), len(record))
+    doubtful = replace(record, stiffness=stated, force=record.force + noise)
+    if stated:
+        assert not [n for n in clean([doubtful])[1] if 'force over displacement tells' in n]
