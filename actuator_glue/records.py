@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, TypeGuard, TypeVar, cast
@@ -58,8 +59,18 @@ def numbers(values: ArrayLike) -> Array:
     Raises:
         TypeError, ValueError: what is no number, complex numbers among them.
     """
-    if isinstance(values, np.ndarray) and values.dtype.kind in 'cmM':
-        raise TypeError(f'{values.dtype} is no displacement or force')
+    # A list has no type, and numpy drops the imaginary part of what stands in one. Columns of
+    # pandas and others have one that may not be numpy's.
+    held = values if hasattr(values, 'dtype') else np.asarray(values)
+    dtype = held.dtype
+    if getattr(dtype, 'kind', '') in ('c', 'm', 'M'):
+        raise TypeError(f'{dtype} is no displacement or force')
+    if getattr(dtype, 'kind', '') == 'O':
+        turned = (
+            v for v in np.ravel(np.asarray(held)) if isinstance(v, (complex, np.complexfloating))
+        )
+        if (first := next(turned, None)) is not None:
+            raise TypeError(f'{first} is no displacement or force')
     if isinstance(values, np.ma.MaskedArray):
         return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
     return np.array(values, dtype=np.float64)
@@ -111,18 +122,40 @@ def _universal(time: Any) -> Any:
     return time if ahead is None else time.replace(tzinfo=None) - ahead
 
 
+def _of_day(time: datetime.time) -> float:
+    """Return a time of day in seconds."""
+    return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+
+
 def _clock(time: ArrayLike, source: str) -> tuple[float, int]:
-    """Return the period [s] of times in seconds or as datetimes, and the first one [ns].
+    """Return the period [s] of times in seconds, of day or as datetimes, and the first one [ns].
 
     Raises:
         InputError: no list of times, or none of even steps.
     """
     where = source or 'time'
+    masked = np.asarray(time.mask if isinstance(time, np.ma.MaskedArray) else False)
+    if masked.any():
+        raise InputError(
+            f'{where}: time is masked at sample {int(np.ravel(masked).argmax())}: nobody knows '
+            'when that was; leave such samples out at the ends, or cut the record there'
+        )
     column = np.asarray(time)
     if column.ndim != 1:
         raise InputError(f'{where}: time must be one-dimensional, got shape {column.shape}')
-    if column.dtype.kind == 'O' and all(hasattr(t, 'utcoffset') for t in column):
-        column = np.array([_universal(t) for t in column], dtype='datetime64[ns]')
+    if (
+        column.dtype.kind == 'O'
+        and len(column)
+        and all(isinstance(t, datetime.time) for t in column)
+    ):
+        column = np.array([_of_day(t) for t in column])
+    elif column.dtype.kind == 'O' and all(hasattr(t, 'utcoffset') for t in column):
+        try:
+            column = np.array([_universal(t) for t in column], dtype='datetime64[ns]')
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InputError(
+                f'{where}: time is no list of seconds or of datetimes ({error})'
+            ) from error
     if column.dtype.kind == 'M':
         if np.isnat(column).any():
             raise InputError(f'{where}: time has no date at sample {np.isnat(column).argmax()}')
@@ -283,7 +316,8 @@ class Record:
         """Return the record of a test whose channels are arrays, columns of a table or lists.
 
         Args:
-            time: when each sample was taken, shape (n,): seconds, or datetimes of numpy or pandas.
+            time: when each sample was taken, shape (n,): seconds, datetimes of numpy or pandas, or
+                times of day.
             command: commanded displacement, shape (n,) [unit].
             measured: measured displacement, shape (n,) [unit].
             force: measured actuator force, shape (n,) [force_unit]; None where there is none.

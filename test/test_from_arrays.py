@@ -110,3 +110,39 @@ def test_a_unit_is_never_guessed() -> None:
     """Nobody is taken to have meant metres."""
     with pytest.raises(TypeError, match='unit'):
         ag.Record.from_arrays(TIME, U, X)  # type: ignore[call-arg]  # that is the fault
+
+
+@pytest.mark.parametrize('wrap', [list, tuple, lambda v: np.array(v, dtype=object), pd.Series])
+def test_complex_numbers_are_refused_in_whatever_holds_them(wrap: Any) -> None:
+    """Of a list the real parts had been taken."""
+    values = [np.complex128(1e-3 + 1j), np.complex128(2e-3), np.complex128(0.0)]
+    with pytest.raises(ag.InputError, match='measured is not a list of numbers'):
+        ag.Record.from_arrays([0.0, 0.1, 0.2], [0.0, 1.0, 2.0], wrap(values), unit='mm')
+
+
+@pytest.mark.parametrize(
+    'time', [np.arange(4) * 0.1, np.datetime64('2026-01-01', 'ms') + 100 * np.arange(4)]
+)
+def test_masked_times_are_refused(time: np.ndarray) -> None:
+    """Nobody knows when that sample was taken, whatever stands under the mask."""
+    for masked in ([False, False, True, False], [False] * 4):
+        hidden = np.ma.array(time, mask=masked)
+        if any(masked):
+            with pytest.raises(ag.InputError, match='time is masked at sample 2'):
+                ag.Record.from_arrays(hidden, [0, 1, 2, 3], [0, 1, 2, 3], unit='mm')
+        else:
+            made = ag.Record.from_arrays(hidden, [0, 1, 2, 3], [0, 1, 2, 3], unit='mm')
+            assert made.period == pytest.approx(0.1)
+
+
+def test_times_of_day_are_seconds_of_it() -> None:
+    """As a spreadsheet holds them; three that are one are refused like any other times."""
+    times = [
+        (pd.Timestamp('2026-01-01 10:00') + pd.Timedelta(seconds=i / 8)).time() for i in range(5)
+    ]
+    made = ag.Record.from_arrays(times, range(5), range(5), unit='mm')
+    assert made.period == 0.125 and made.start_ns == 36_000 * 10**9
+    with pytest.raises(ag.InputError, match='stands still'):
+        ag.Record.from_arrays(times[:1] * 3, [0, 1, 2], [0, 1, 2], unit='mm')
+    with pytest.raises(ag.InputError, match='no list of seconds or of datetimes'):
+        ag.Record.from_arrays([times[0], pd.Timestamp('2026-01-01')], [0, 1], [0, 1], unit='mm')
