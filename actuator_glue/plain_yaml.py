@@ -1,13 +1,15 @@
-"""YAML as plain data: no objects, and no key twice in one mapping, where the last would win."""
+"""YAML as plain data: no objects, no key twice in a mapping, no number that is another one."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import yaml
 
 from actuator_glue.errors import InputError
 
+_OTHER_BASE = re.compile(r'[+-]?(?:0[0-9_]+$|[0-9_]+:)')
 _MERGED = 'tag:yaml.org,2002:merge'  # `<<`, which may stand beside keys that it brings
 
 
@@ -47,6 +49,27 @@ class _Loader(_OnceEach, yaml.SafeLoader):
     """Every text but metadata of bags: its errors show the line."""
 
 
+def _decimal(loader: Any, node: yaml.ScalarNode) -> int | float:
+    """Return a number that everybody reads as this one.
+
+    Raises:
+        InputError: YAML 1.1 reads `0500` to the base of 8 and `1:30` to that of 60; says where.
+    """
+    text = str(node.value)
+    if _OTHER_BASE.match(text):
+        raise InputError(
+            f'{text} in line {node.start_mark.line + 1} is not read as it looks: leave out '
+            "leading zeros and colons; what is no number stands in quotes ('0500')"
+        )
+    if node.tag.endswith(':int'):
+        return int(loader.construct_yaml_int(node))
+    return float(loader.construct_yaml_float(node))
+
+
+for _kind in ('int', 'float'):
+    _Loader.add_constructor(f'tag:yaml.org,2002:{_kind}', _decimal)
+
+
 class _QuickLoader(_OnceEach, getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]  # known at run time
     """By libyaml, where PyYAML was built with it: ten times as fast."""
 
@@ -60,7 +83,8 @@ def plain_yaml(text: str, where: str, *, quick: bool = False) -> Any:
         quick: read it with libyaml, whose messages say less.
 
     Raises:
-        InputError: a key stands twice in one mapping.
+        InputError: a key stands twice in one mapping; or, unless it is read quickly, a number has
+            a leading zero or a colon.
         yaml.YAMLError: no YAML.
         ValueError: a date that is none, such as 2001-99-99.
         RecursionError: a thousand brackets.

@@ -66,3 +66,13 @@ def test_a_date_that_is_none_is_said(tmp_path: Path) -> None:
     for read in (read_effects, read_partition):
         with pytest.raises(InputError, match=r'e\.yaml.*YAML'):
             read(path)
+
+
+@pytest.mark.parametrize('written', ['0500', '010', '+007', '1:30', '1:30.5'])
+def test_numbers_to_another_base_are_refused(written: str) -> None:
+    """YAML 1.1 reads 0500 as 320 and 1:30 as 90; hexadecimal digits are meant."""
+    with pytest.raises(InputError, match=r'here: .* in line 2 is not read as it looks'):
+        plain_yaml(f'a: 1\nrate: {written}\n', 'here')
+    assert plain_yaml(f"rate: '{written}'", 'here') == {'rate': written}
+    plain = {'a': 0, 'b': 0.5, 'c': -10, 'd': 16, 'e': 1000, 'f': 0.0}
+    assert plain_yaml('{a: 0, b: 0.5, c: -10, d: 0x10, e: 1_000, f: 00.0}', 'here') == plain
