@@ -33,8 +33,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 def beside(out: str | None, write: Callable[[str], object]) -> int:
     """Write a file that goes beside an answer; what fails is told and ends nothing.
 
-    Numbers are written before the answer is printed, so that a reader of it that has gone, as in
-    `| head`, takes nothing from them; pictures after it, as they take their time.
+    Numbers are written before the answer is printed; pictures after it, as they take their time.
 
     Args:
         out: the file; None where nobody asked for it.
@@ -48,8 +47,6 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
         return 0
     try:
         write(out)
-    except BrokenPipeError:  # the reader of our output has gone
-        raise
     except (InputError, OSError) as error:
         print(f'actuator-glue: {_told(str(error))}', file=sys.stderr)
         return 2

@@ -18,6 +18,7 @@ from pathlib import Path
 from actuator_glue import cli
 from actuator_glue.arguments import claim_outputs
 from actuator_glue.cli._parser import Parser, examples
+from actuator_glue.cli._streams import Stream, standard_streams
 from actuator_glue.errors import InputError
 from actuator_glue.motion import METRES, speak, spoken
 
@@ -57,11 +58,25 @@ def build_parser(chosen: str | None) -> Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Run one command and return its exit code.
+
+    The code is the command's own, whether or not anybody reads what it prints; 2 where what it
+    prints cannot be written, as on a full disk.
+    """
+    with standard_streams() as (out, _):
+        code = _run(list(sys.argv[1:] if argv is None else argv), out)
+        out.flush()
+        if out.fault:
+            print(f'actuator-glue: standard output: {out.fault}', file=sys.stderr)
+            return 2
+    return code
+
+
+def _run(argv: list[str], out: Stream) -> int:
+    """Return the exit code of a command; what it raises becomes one line."""
     # Our matrices are small and our own threads use the cores: those of the linear algebra on top
     # would only wait for each other (a diagnosis takes 1.7 times the processor time).
     os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    argv = list(sys.argv[1:] if argv is None else argv)
     debug = '--debug' in argv
     argv = [a for a in argv if a != '--debug']  # wherever it stands
     chosen = next((a for a in argv if not a.startswith('-')), None)
@@ -78,16 +93,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.command is None:
             parser.print_help()
             return 2
+        if out.closed_before and getattr(args, 'json', None) == '-':
+            raise InputError(
+                '--json -: standard output is closed; give the name of a file, or leave it open'
+            )
         claim_outputs(args)
         return int(args.run(args))
     except InputError as error:
         return _fail(str(error), 2, debug)
     except KeyboardInterrupt:
         return _fail('interrupted', 130, debug=False)
-    except BrokenPipeError:
-        # The reader of our output has gone (`| head`): nothing to tell, nobody to tell it to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except MemoryError:
         return _fail('not enough memory for this; use shorter records or fewer samples', 2, debug)
     except OSError as error:

@@ -1,0 +1,84 @@
+"""Standard output and standard error of a command, which may be closed, full, or read by nobody."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO, cast
+
+
+class Stream:
+    """A text stream that never ends a command: what cannot be written is dropped from then on.
+
+    A reader that has gone, as in `| head -1`, is no fault: nobody misses what comes after. Any
+    other fault, as a full disk, is kept for the end of the command. Files are written and the
+    command's own exit code stands either way.
+
+    Attributes:
+        closed_before: the command was started without this stream, as with `>&-`.
+        fault: why something could not be written; empty where nothing was in the way.
+    """
+
+    def __init__(self, under: TextIO | None) -> None:
+        self.closed_before = under is None
+        self.fault = ''
+        # Opened in place of a closed stream, it takes that one's number, which the next file of
+        # the command would have otherwise: what libraries print would land there.
+        self._under = open(os.devnull, 'w', encoding='utf-8') if under is None else under  # noqa: SIM115
+        self._gone = False
+
+    def write(self, text: str) -> int:
+        """Write a text, or drop it."""
+        if not self._gone:
+            try:
+                self._under.write(text)
+            except OSError as error:
+                self._give_up(error)
+        return len(text)
+
+    def writelines(self, lines: Any) -> None:
+        """Write texts, or drop them."""
+        self.write(''.join(lines))
+
+    def flush(self) -> None:
+        """Hand on what was written."""
+        if not self._gone:
+            try:
+                self._under.flush()
+            except OSError as error:
+                self._give_up(error)
+
+    def end(self) -> None:
+        """Hand on what was written; close what was opened in place of a closed stream."""
+        self.flush()
+        if self.closed_before:
+            self._under.close()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._under, name)
+
+    def _give_up(self, error: OSError) -> None:
+        self._gone = True
+        if not isinstance(error, BrokenPipeError):
+            self.fault = error.strerror or str(error)
+        # What the stream still holds is tried again when Python ends: it must go somewhere then.
+        with suppress(OSError, ValueError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, self._under.fileno())
+            os.close(null)
+
+
+@contextmanager
+def standard_streams() -> Iterator[tuple[Stream, Stream]]:
+    """Put a `Stream` around standard output and standard error; yield both."""
+    before = sys.stdout, sys.stderr
+    out, err = Stream(before[0]), Stream(before[1])
+    sys.stdout, sys.stderr = cast(TextIO, out), cast(TextIO, err)
+    try:
+        yield out, err
+    finally:
+        out.end()
+        err.end()
+        sys.stdout, sys.stderr = before
