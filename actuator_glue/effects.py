@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as given_path
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.model.effects.terms.entry import term
@@ -56,7 +57,7 @@ def read_effects(path: Path | str) -> tuple[Effect, ...]:
     Raises:
         InputError: it cannot be read, or an effect cannot be used; says where.
     """
-    path = Path(path)
+    path = given_path(path)
     try:
         text = path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
@@ -69,16 +70,20 @@ def read_effects(path: Path | str) -> tuple[Effect, ...]:
 def save_effects(path: Path | str, effects: Iterable[Effect]) -> None:
     """Write effects that are written as expressions to a YAML file for `load_effects`.
 
+    Its folder is made if need be.
+
     Raises:
-        InputError: the file cannot be written, or an effect has a compiled stage of its own.
+        InputError: no path, the file cannot be written, or an effect has a compiled stage of its own.
     """
     chosen = tuple(effects)
     for effect in chosen:
         if effect.expression is None:
             raise InputError(f'effect {effect.name!r} is not written as an expression')
     text = yaml.safe_dump(mapping(chosen), sort_keys=False, allow_unicode=True)
+    path = given_path(path)
     try:
-        Path(path).write_text(text, encoding='utf-8')
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding='utf-8')
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror})') from error
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from io import IOBase
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, SupportsFloat, cast
 
 import numpy as np
@@ -60,6 +61,23 @@ def one_thing(value: object) -> bool:
     its lines.
     """
     return isinstance(value, (str, PathLike, Mapping, IOBase)) or hasattr(value, 'columns')
+
+
+def path(value: object, name: str = 'path') -> Path:
+    """Return the path of a file or folder, whatever holds it.
+
+    Args:
+        value: what was given.
+        name: of the argument, for the message.
+
+    Raises:
+        InputError: None, a number, bytes or another thing that is no path.
+    """
+    of_kind(value, name, (str, PathLike), "the name of a file, as 'monday.npz'")
+    try:
+        return Path(cast('str | PathLike[str]', value))
+    except TypeError:
+        raise InputError(f'{name} is {_shown(value)}; give it as text') from None
 
 
 def of_kind(value: object, name: str, kinds: type | tuple[type, ...], wanted: str) -> None:

@@ -185,8 +185,9 @@ def test_a_mat_file_holds_draws_and_model(posterior: ag.Calibration, tmp_path: P
             assert ours == pytest.approx(theirs, rel=1e-6)
     one = scipy.io.loadmat(posterior.save_mat(tmp_path / 'one.mat', 1e6))['model']
     assert one.shape == (1, 1) and one[0, 0]['den'][0, 0] > 1e6
+    assert posterior.save_mat(tmp_path / 'new' / 'er' / 'a.mat').exists()
     with pytest.raises(ag.InputError, match='cannot be written'):
-        posterior.save_mat(tmp_path / 'nowhere' / 'a.mat')
+        posterior.save_mat(tmp_path / 'one.mat' / 'a.mat')
 
 
 def test_arviz_has_every_group(posterior: ag.Calibration, data: Any, tmp_path: Path) -> None:
@@ -231,3 +232,31 @@ def test_terms_of_the_likelihood_add_up(
     assert np.ptp(total.values) > 1.0
     found = az.loo(data, var_name='measured_1')
     assert found.n_data_points == 21 and found.elpd_loo > 0.0
+
+
+@pytest.mark.parametrize('rate', [0, -1000.0, float('nan'), float('inf'), 'fast', None])
+def test_samples_need_a_rate_that_can_be(posterior: ag.Calibration, rate: Any) -> None:
+    """One sentence that names the argument and what to give."""
+    command = simulated(STIFF, 6).command
+    with pytest.raises(ag.InputError, match=r'rate.*give|give their rate') as refused:
+        posterior.predict(command, STIFF, rate=rate)
+    assert rate is None or repr(rate).removesuffix('.0') in str(refused.value)
+    with pytest.raises(ag.InputError, match='rate'):
+        ag.Command(rate=rate).samples()
+
+
+@pytest.mark.parametrize('path', [None, 7, b'a.npz', ['a.npz']])
+def test_files_need_a_name(posterior: ag.Calibration, path: Any) -> None:
+    """What is no path is refused as such, and says what to give."""
+    for use in (posterior.save, posterior.save_mat, ag.Calibration.load, ag.effects.load_effects):
+        with pytest.raises(
+            ag.InputError, match=r"path is .*; give the name of a file, as 'monday"
+        ):
+            use(path)
+
+
+def test_folders_of_results_are_made(posterior: ag.Calibration, tmp_path: Path) -> None:
+    """As those of reports are."""
+    assert posterior.save(tmp_path / 'new' / 'er' / 'a.npz').exists()
+    with pytest.raises(ag.InputError, match='cannot be written'):
+        posterior.save(tmp_path / 'new' / 'er' / 'a.npz' / 'b.npz')

@@ -83,7 +83,8 @@ def commanded(
         hold: how samples run from one to the next; None for what the record says, else 'zoh'.
 
     Raises:
-        InputError: samples without a rate, no stiffness, or what is no command.
+        InputError: samples without a rate or with an impossible one, no stiffness, or what is no
+            command.
     """
     if isinstance(command, Command):
         samples, period = command.samples(), 1.0 / command.rate
@@ -104,7 +105,7 @@ def commanded(
     else:
         if rate is None:
             raise InputError('the command is samples: give their rate [Hz], as rate=1000.0')
-        samples, period = np.asarray(command), 1.0 / number(rate, 'rate')
+        samples, period = np.asarray(command), 1.0 / _rate(rate)
     if stiffness is None:
         raise InputError('give the specimen stiffness [N/m], 0 for a free actuator')
     shape = np.shape(samples)
@@ -112,3 +113,17 @@ def commanded(
         Record(samples, np.zeros(shape), period, check_stiffness(stiffness), hold=hold or 'zoh'),
         False,
     )
+
+
+def _rate(rate: float) -> float:
+    """Return samples per second.
+
+    Raises:
+        InputError: no number, or none that samples can come at.
+    """
+    found = number(rate, 'rate')
+    if not 0.0 < found < np.inf:
+        raise InputError(
+            f'rate is {found:g}; give the samples per second [Hz], more than 0, as rate=1000.0'
+        )
+    return found

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as given_path
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array
 
@@ -80,6 +81,8 @@ def polynomials(theta: Array, stiffness: float) -> tuple[Array, Array]:
 def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]) -> Path:
     """Write draws and models under some stiffnesses to a .mat file; return its path.
 
+    Its folder is made if need be.
+
     Variables: `draws` (m x p), `names`, `units`, `effects`, `problems` (cells), `mean`, `stddev`
     (1 x p), `covariance` (p x p), `model`: a struct for each stiffness with `stiffness`, `num`,
     `den` of the mean of the draws, `delay` [s], and `num_draws`, `den_draws`, a row for each draw.
@@ -91,7 +94,7 @@ def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]
         models: one for each stiffness.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: no path, or the file cannot be written.
     """
     kinds = [(name, object) for name in TransferFunction._fields]
     model = np.zeros((1, len(models)), dtype=kinds)
@@ -108,8 +111,9 @@ def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]
         'covariance': np.atleast_2d(np.cov(of.draws, rowvar=False)),
         'model': model,
     }
-    path = Path(path)
+    path = given_path(path)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         scipy.io.savemat(str(path), content, appendmat=False, do_compression=True)
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from actuator_glue.api import store
+from actuator_glue.given import path as given_path
 from actuator_glue.motion import METRES, speaking, spoken
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class Result(ABC):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(Path(path), self.page())
+            return html.write(given_path(path), self.page())
 
     def __repr__(self) -> str:
         """Return what came out in a few lines, without arrays."""

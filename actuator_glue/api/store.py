@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as given_path
 from actuator_glue.model.effects import CATALOGUE
 
 T = TypeVar('T')
@@ -23,7 +24,7 @@ _CONTENT = 'content'
 def save(
     path: Path | str, schema: str, value: Any, effects: Iterable[str] = (), **more: Any
 ) -> Path:
-    """Write a dataclass to one .npz file and return its path.
+    """Write a dataclass to one .npz file and return its path; its folder is made if need be.
 
     Args:
         path: where to.
@@ -34,7 +35,7 @@ def save(
         more: further arrays, for readers that know nothing of the rest.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: no path, or the file cannot be written.
     """
     arrays: dict[str, Any] = {}
     text = np.array(
@@ -42,8 +43,9 @@ def save(
             {'schema': schema, 'value': _pack(value, arrays), **CATALOGUE.definitions(effects)}
         )
     )
-    path = Path(path)
+    path = given_path(path)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open('wb') as file:
             np.savez_compressed(file, allow_pickle=False, **{**more, **arrays, _CONTENT: text})
     except OSError as error:
@@ -55,8 +57,9 @@ def load(path: Path | str, schema: str, cls: type[T]) -> T:
     """Return what `save` wrote; registers the effects that it defines.
 
     Raises:
-        InputError: the file cannot be read, or holds something else.
+        InputError: no path, the file cannot be read, or holds something else.
     """
+    path = given_path(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             content = json.loads(str(file[_CONTENT]))
@@ -75,8 +78,9 @@ def schema_of(path: Path | str) -> str:
     """Return what a file that `save` wrote holds.
 
     Raises:
-        InputError: the file cannot be read, or holds nothing of ours.
+        InputError: no path, the file cannot be read, or holds nothing of ours.
     """
+    path = given_path(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             return str(json.loads(str(file[_CONTENT]))['schema'])
