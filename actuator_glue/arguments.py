@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -79,6 +81,10 @@ def given(args: argparse.Namespace, option: str) -> bool:
     return value is not None and value is not False and value != []
 
 
+class Input(str):
+    """A file, bag or folder that a command reads."""
+
+
 class Output(str):
     """A file or bag that a command writes; `-` is standard output."""
 
@@ -96,24 +102,98 @@ def claim(path: Path | str, args: argparse.Namespace) -> Path:
     """Return a path that may be written: nothing is there, or it may be overwritten.
 
     Raises:
-        InputError: something is there and `--force` was not given.
+        InputError: the command reads what is there, or something is there and `--force` was not
+            given.
     """
     out = Path(path)
+    if str(path) == '-':
+        return out
+    for read in _inputs(args):
+        if _takes_place_of(path, read):
+            which = 'it' if out == read else f'{read}'
+            raise InputError(
+                f'{out}: this command reads {which}, and writing there would destroy it; choose '
+                'another name for the output'
+            )
     if isinstance(path, Folder):
         taken = out.is_file() or (out.is_dir() and any(out.iterdir()))
     else:
-        taken = str(path) != '-' and (out.is_file() or out.is_dir())  # a device is written to
+        taken = out.is_file() or out.is_dir()  # a device is written to
     if taken and not args.force:
         raise InputError(f'{out} exists already; choose another name, or add --force')
     return out
 
 
 def claim_outputs(args: argparse.Namespace) -> None:
-    """Refuse what would be overwritten, before any long work is done for it.
+    """Refuse outputs that cannot stand where they are to go, before any long work is done.
+
+    Folders that are not there will be made, see `make_room`; that they can be is looked at here.
 
     Raises:
-        InputError: as `claim`.
+        InputError: as `claim`; two outputs of one name, or no folder can be made for one.
     """
+    options: dict[Path, str] = {}
+    for name, value in vars(args).items():
+        if not isinstance(value, Output):
+            continue
+        if value == '-' and name != 'json':
+            raise InputError(
+                "'-' is standard output, where only --json can go; give the name of a file"
+            )
+        out = claim(value, args)
+        if value == '-' or (out.exists() and not out.is_file() and not out.is_dir()):
+            continue  # a stream or device takes what comes
+        _check_room(out)
+        option = f'--{name.replace("_", "-")}'
+        other = options.setdefault(out.resolve(), option)
+        if other != option and not isinstance(value, Folder):  # which holds files of many names
+            raise InputError(
+                f'{other} and {option} would both write {out}; give each a name of its own'
+            )
+
+
+def make_room(out: Path | str) -> None:
+    """Make the folder of an output where it is not there.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    folder = Path(out).parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f'{out}: its folder cannot be made ({error.strerror or error}); choose another one'
+        ) from error
+
+
+def _check_room(out: Path) -> None:
+    """Refuse an output whose folder is not there and cannot be made."""
+    if out.exists():
+        return
+    there = next(folder for folder in out.absolute().parents if os.path.lexists(folder))
+    if not there.is_dir():
+        raise InputError(f'{out}: {there} is no folder; choose another name')
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f'{out}: nothing may be written in {there}; choose another folder')
+
+
+def _inputs(args: argparse.Namespace) -> Iterator[Path]:
+    """Yield what a command reads, as far as it is there; names of what comes with us are not."""
     for value in vars(args).values():
-        if isinstance(value, Output):
-            claim(value, args)
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, (Input, Path)) and Path(one).exists():
+                yield Path(one)
+
+
+def _takes_place_of(path: Path | str, read: Path) -> bool:
+    """Whether writing an output would destroy an input, under whatever names both are known."""
+    out = Path(path).resolve()
+    if out.exists() and out.samefile(read):
+        # A folder that is filled keeps what it holds; a device stays what it is.
+        return not isinstance(path, Folder) and (out.is_file() or out.is_dir())
+    if read.is_dir():
+        # No record is called so, and summaries of a folder may lie in it.
+        summary = out.suffix in ('.json', '.html')
+        return out.is_file() and not summary and read.resolve() in out.parents
+    return not isinstance(path, Folder) and out in read.resolve().parents

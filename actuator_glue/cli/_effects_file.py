@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from actuator_glue.arguments import Input
+
 
 def add_effects_file(parser: argparse._ActionsContainer) -> None:
     """Add --effects-file."""
@@ -11,6 +13,7 @@ def add_effects_file(parser: argparse._ActionsContainer) -> None:
         '--effects-file',
         action='append',
         default=[],
+        type=Input,
         metavar='EFFECTS.yaml|.py',
         help='effects of your own as expressions, e.g. sensor: y = y + cubic*y**3; repeatable '
         '(docs/effects.md, "Your own effects")',

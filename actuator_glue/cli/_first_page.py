@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.arguments import Output, duration
+from actuator_glue.arguments import Input, Output, duration
 from actuator_glue.cli._output import say, table
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def add_partition(parser: argparse.ArgumentParser) -> None:
     """Declare `--partition`."""
     parser.add_argument(
         '--partition',
+        type=Input,
         metavar='FILE|NAME',
         help='a hybrid test, as `rths` takes it: the answer says whether it bears the delay of '
         'the actuator',

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from actuator_glue.arguments import Output, add_force
+from actuator_glue.arguments import Output, add_force, make_room
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
 
@@ -46,6 +46,8 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
     if out is None:
         return 0
     try:
+        if out != '-':
+            make_room(out)
         write(out)
     except (InputError, OSError) as error:
         print(f'actuator-glue: {_told(str(error))}', file=sys.stderr)

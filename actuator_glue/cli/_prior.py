@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from actuator_glue.arguments import duration, number, only_with
+from actuator_glue.arguments import Input, duration, number, only_with
 
 
 def add_prior(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         '--prior',
-        type=Path,
+        type=Input,
         metavar='FILE',
         help='what an earlier `calibrate --save FILE` of this actuator knew',
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import number, only_with, stiffness
+from actuator_glue.arguments import Input, number, only_with, stiffness
 from actuator_glue.cli._output import note
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
@@ -19,6 +19,7 @@ def add_records(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'records',
         nargs='+',
+        type=Input,
         metavar='RECORD',
         help=f'bag folder, .mcap, {", ".join(formats())}, or other text with --channels',
     )
@@ -36,7 +37,10 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         'a free actuator or a shaking table, `unknown` leaves it open); wins over what files say',
     )
     parser.add_argument(
-        '--channels', metavar='MAP.yaml', help='channel map: columns of files, or topics of a bag'
+        '--channels',
+        type=Input,
+        metavar='MAP.yaml',
+        help='channel map: columns of files, or topics of a bag',
     )
     parser.add_argument(
         '--hold',

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from actuator_glue.arguments import Output, add_force, claim
+from actuator_glue.arguments import Output, add_force, claim, make_room
 from actuator_glue.cli._output import progress, say
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import writable
@@ -78,6 +78,7 @@ def save(records: list[Record], args: argparse.Namespace) -> None:
         InputError: the output exists or cannot be written.
     """
     out = check_out(args)
+    make_room(out)
     written = [out]
     if out.suffix in writable():
         written = _files(records, out, args)

@@ -10,6 +10,7 @@ import argparse
 import time
 from pathlib import Path
 
+from actuator_glue.arguments import Input
 from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -25,7 +26,7 @@ _LISTED = 20  # failures that are printed
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        'records', nargs='*', metavar='RECORD', help='files, bags, and folders of them'
+        'records', nargs='*', type=Input, metavar='RECORD', help='files, bags, and folders of them'
     )
     parser.add_argument(
         '--out',
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--recipe',
+        type=Input,
         metavar='CAMPAIGN.yaml',
         help='how to read, group and analyse the records (default: every file by itself)',
     )

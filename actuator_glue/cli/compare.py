@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import asdict
 
+from actuator_glue.arguments import Input
 from actuator_glue.cli._output import add_json, beside, say, table
 from actuator_glue.io.json_file import write_json
 
@@ -20,7 +21,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('folder', metavar='DIR', help='what `campaign --out DIR` made')
+    parser.add_argument('folder', type=Input, metavar='DIR', help='what `campaign --out DIR` made')
     parser.add_argument(
         'a', metavar='A', help='a day, a stretch of days FIRST:LAST, or the name of a test'
     )

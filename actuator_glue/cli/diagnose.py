@@ -12,7 +12,7 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import Output
+from actuator_glue.arguments import Input, Output
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._heap import give_back
@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--holdout',
         action='append',
         default=[],
+        type=Input,
         metavar='RECORD',
         help='record that decides nothing and gives the error before and after; repeatable '
         '(default: every fourth block of each record)',

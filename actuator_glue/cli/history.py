@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from actuator_glue.arguments import Folder, duration
+from actuator_glue.arguments import Folder, Input, duration
 from actuator_glue.cli._output import add_json, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -18,7 +18,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('folder', metavar='DIR', help='what `campaign --out DIR` made')
+    parser.add_argument('folder', type=Input, metavar='DIR', help='what `campaign --out DIR` made')
     parser.add_argument(
         '--actuator', metavar='NAME', help='of this one alone (default: every one with days)'
     )

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.arguments import Output, number
+from actuator_glue.arguments import Input, Output, make_room, number
 from actuator_glue.cli._output import add_json, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -27,7 +27,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('file', metavar='FILE', help='any file of numbers, or any bag')
+    parser.add_argument('file', type=Input, metavar='FILE', help='any file of numbers, or any bag')
     parser.add_argument(
         '--rate', type=number, metavar='HZ', help='samples per second, where no column tells them'
     )
@@ -166,6 +166,7 @@ def _called(column: ColumnLook) -> str:
 
 
 def _write(path: Path, text: str) -> None:
+    make_room(path)
     try:
         path.write_text(text, encoding='utf-8')
     except OSError as error:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import add_force, claim
+from actuator_glue.arguments import Input, add_force, claim
 from actuator_glue.cli._output import note, say
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
     parser.add_argument(
         '--draws',
+        type=Input,
         metavar='DRAWS.npz',
         help='what `calibrate --save` wrote: also its picture, and its bands over every record',
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from actuator_glue.arguments import Input
 from actuator_glue.cli._output import add_json, say
 from actuator_glue.io.json_file import write_json
 
@@ -15,7 +16,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', metavar='BAG', help='bag folder or lone .mcap')
+    parser.add_argument('bag', type=Input, metavar='BAG', help='bag folder or lone .mcap')
     add_json(parser)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import number, number_or_auto
+from actuator_glue.arguments import Input, number, number_or_auto
 from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
@@ -24,7 +24,9 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', metavar='BAG', help='bag folder, .mcap, or a laboratory file')
+    parser.add_argument(
+        'bag', type=Input, metavar='BAG', help='bag folder, .mcap, or a laboratory file'
+    )
     add_reading(parser)
     parser.add_argument(
         '--namespace', metavar='/NS', help='whose samples, where a bag has several actuators'

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from actuator_glue.arguments import Output, number
+from actuator_glue.arguments import Input, Output, number
 from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -24,12 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         'partition',
+        type=Input,
         metavar='PARTITION',
         help='YAML file of the hybrid test, or a shipped one: benchmark_case_1 ... 4, sdof',
     )
     parser.add_argument(
         '--posterior',
         required=True,
+        type=Input,
         metavar='DRAWS.npz',
         help='what `calibrate --save` wrote',
     )
@@ -59,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--ground-motion',
+        type=Input,
         metavar='RECORD',
         help='every draw runs this record: AT2 (PEER), text with time and acceleration and their '
         'units in the names (m/s^2 where none is said), or artificial[:SEED]',

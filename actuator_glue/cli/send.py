@@ -6,7 +6,7 @@ import argparse
 import time
 from dataclasses import asdict
 
-from actuator_glue.arguments import number
+from actuator_glue.arguments import Input, number
 from actuator_glue.cli._output import add_json, note, progress, say
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
@@ -19,7 +19,9 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('record', metavar='RECORD', help='bag folder, .mcap, or laboratory file')
+    parser.add_argument(
+        'record', type=Input, metavar='RECORD', help='bag folder, .mcap, or laboratory file'
+    )
     parser.add_argument(
         '--to',
         required=True,
@@ -28,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--layout',
+        type=Input,
         metavar='FILE.yaml',
         help='what a packet holds; without it little-endian counter (uint32), time, command, '
         'measured, force (float64, SI units)',
@@ -40,7 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='record seconds per second; 0 sends as fast as possible, which UDP may not survive',
     )
     parser.add_argument(
-        '--key-file', metavar='FILE', help='sign every message with this key (HMAC-SHA256)'
+        '--key-file',
+        type=Input,
+        metavar='FILE',
+        help='sign every message with this key (HMAC-SHA256)',
     )
     add_reading(parser)
     add_json(parser)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.arguments import claim, given, number
+from actuator_glue.arguments import Input, claim, given, number
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import note, progress
 from actuator_glue.cli._save import add_out, check_out, save
@@ -82,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--command',
         dest='shape',
         default='sweep',
+        type=Input,
         metavar='|'.join((*COMMANDS, 'FILE')),
         help='shape, or a bag or laboratory file whose command is used (default sweep)',
     )
@@ -94,7 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     command.add_argument(
         '--command-seed', type=int, metavar='S', help='of noise and earthquake (default 0)'
     )
-    command.add_argument('--channels', metavar='MAP.yaml', help='channel map of FILE')
+    command.add_argument('--channels', type=Input, metavar='MAP.yaml', help='channel map of FILE')
     parser.add_argument('--hold', choices=('zoh', 'linear'), default='zoh', help='default zoh')
 
 

@@ -8,6 +8,7 @@ import os
 import sys
 import threading
 
+from actuator_glue.arguments import Input
 from actuator_glue.cli._output import note, say
 from actuator_glue.errors import InputError
 
@@ -19,7 +20,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bag', nargs='?', metavar='BAG', help='bag folder or .mcap')
+    parser.add_argument('bag', nargs='?', type=Input, metavar='BAG', help='bag folder or .mcap')
     parser.add_argument(
         '--live', action='store_true', help='what the nodes publish now; needs ROS 2'
     )

@@ -1,9 +1,15 @@
 """No output takes the place of a file unasked, and none is left half written."""
 
+import argparse
+import re
+import shutil
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from actuator_glue.arguments import Input, Output
+from actuator_glue.cli.main import commands
 from actuator_glue.io.load import load_records
 
 
@@ -114,3 +120,131 @@ def test_half_a_conversion_is_not_left_behind(
     done = run('convert', short_bag, tmp_path / name)
     assert done.code in (2, 130)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def tests(tmp_path: Path, short_bag: Path, run, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, with what commands read: x.csv, map.yaml, a bag, and links to them."""
+    (tmp_path / 'x.csv').write_text('time_s,command_mm,measured_mm\n0,0,0\n0.01,1,1\n0.02,1,1\n')
+    (tmp_path / 'map.yaml').write_text('command: {column: command_mm, unit: mm}\n')
+    (tmp_path / 'link.npz').symlink_to('x.csv')
+    (tmp_path / 'link').symlink_to('.')
+    (tmp_path / 'hard.csv').hardlink_to(tmp_path / 'x.csv')
+    shutil.copytree(short_bag, tmp_path / 'bag')
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Return every file of a folder by its path."""
+    files = (p for p in folder.rglob('*') if p.is_file() and not p.is_symlink())
+    return {str(p.relative_to(folder)): p.read_bytes() for p in files}
+
+
+@pytest.mark.parametrize(
+    ('line', 'read'),
+    [
+        ('info x.csv --json x.csv', 'it'),
+        ('calibrate bag x.csv --json ./x.csv', 'it'),
+        ('calibrate x.csv --save link.npz', 'x.csv'),
+        ('calibrate x.csv --report link/x.csv', 'x.csv'),
+        ('calibrate x.csv --json hard.csv', 'x.csv'),
+        ('calibrate link.npz --json x.csv', 'link.npz'),
+        ('diagnose bag --holdout x.csv --report x.csv', 'it'),
+        ('info x.csv --channels map.yaml --json map.yaml', 'it'),
+        ('map x.csv --out x.csv', 'it'),
+        ('convert bag bag', 'it'),
+        ('convert x.csv x.csv --unit m', 'it'),
+        ('info bag --json bag/metadata.yaml', 'bag'),
+        ('convert bag/MCAP bag', 'bag/MCAP'),
+        ('simulate x.csv --command x.csv', 'it'),
+    ],
+)
+def test_no_output_takes_the_place_of_an_input(run, tests: Path, line: str, read: str) -> None:
+    """Under no name and not by --force, and before anything is computed."""
+    (mcap,) = (p.name for p in (tests / 'bag').glob('*.mcap'))
+    before = content(tests)
+    done = run(*line.replace('MCAP', mcap).split(), '--force')
+    assert done.code == 2
+    read = read.replace('MCAP', mcap)
+    assert f'this command reads {read}, and writing there would destroy it' in done.message
+    assert content(tests) == before
+
+
+def test_numbered_outputs_spare_inputs_too(run, tests: Path) -> None:
+    """Where several records make OUT_1.csv, OUT_2.csv, and one of these is read."""
+    assert run('convert', 'bag', 'o_2.csv').code == 0
+    before = content(tests)
+    done = run('convert', 'bag', 'o_2.csv', 'o.csv', '--force')
+    assert done.code == 2 and 'would destroy it' in done.message
+    assert content(tests) == before
+
+
+def test_inputs_are_declared_as_such() -> None:
+    """Every argument that is called a file, bag or folder is an input, an output, or made."""
+    for command in commands():
+        parser = argparse.ArgumentParser()
+        import_module(f'actuator_glue.cli.{command}').add_arguments(parser)
+        for action in parser._actions:
+            words = re.findall(r'[A-Z]{3,}|yaml|npz', str(action.metavar))
+            if {'RECORD', 'FILE', 'BAG', 'PARTITION', 'yaml', 'npz'} & set(words):
+                assert action.type in (Input, Output), (command, action.dest)
+
+
+def test_two_outputs_need_two_names(run, tests: Path) -> None:
+    """However these are written; a device takes what comes."""
+    (tests / 'folder').mkdir()
+    for one, other in (('same.x', 'same.x'), ('same.x', 'folder/../same.x'), ('y', 'link/y')):
+        done = run('calibrate', 'bag', '--json', one, '--report', other)
+        assert done.code == 2
+        assert '--report and --json would both write' in done.message
+        assert 'a name of its own' in done.message
+    done = run('calibrate', 'nope.csv', '--json', '/dev/null', '--report', '/dev/null')
+    assert 'nope.csv' in done.message
+
+
+def test_only_json_goes_to_standard_output(run, tests: Path) -> None:
+    """No file is called `-` by mistake."""
+    for line in ('calibrate bag --report -', 'convert x.csv -', 'map x.csv --out -'):
+        done = run(*line.split())
+        assert done.code == 2 and 'only --json' in done.message
+    assert not (tests / '-').exists()
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        'simulate new/er/y.csv --duration 2 --rate 100',
+        'simulate new/er/y --duration 2 --rate 100 --effect backlash',
+        'convert bag new/er/y.csv',
+        'map x.csv --out new/er/map.yaml',
+        'info bag --json new/er/x.json',
+        'calibrate bag --evaluations 12000 --save new/er/p.npz --json new/er/p.json',
+        'calibrate bag --evaluations 12000 --save new/er/p.mat',
+    ],
+)
+def test_folders_of_outputs_are_made(run, tests: Path, line: str) -> None:
+    """By every command and for every output."""
+    done = run(*line.split())
+    assert done.code in (0, 1), done.err
+    assert list((tests / 'new' / 'er').iterdir())
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        'simulate x.csv/y.csv --duration 1e9',
+        'calibrate nope.csv --save x.csv/p.npz',
+        'calibrate nope.csv --json x.csv/p.json',
+        'calibrate nope.csv --report x.csv/deep/p.html',
+        'diagnose nope.csv --save-effects x.csv/p.yaml',
+        'map nope.csv --out x.csv/p.yaml',
+    ],
+)
+def test_folders_that_cannot_be_made_are_refused_first(run, tests: Path, line: str) -> None:
+    """Before the records are looked at, and no other folder is left behind."""
+    before = content(tests)
+    done = run(*line.split())
+    assert done.code == 2
+    assert 'x.csv is no folder; choose another name' in done.message
+    assert content(tests) == before

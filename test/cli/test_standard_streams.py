@@ -77,9 +77,7 @@ def test_a_full_standard_output_is_told_by_its_name(
         patch.setattr(sys, 'stdout', full)
         assert main(['info', 'x.csv']) == 2
     assert done == ['report']
-    assert capsys.readouterr().err == (
-        'actuator-glue: standard output: No space left on device\n'
-    )
+    assert capsys.readouterr().err == ('actuator-glue: standard output: No space left on device\n')
 
 
 def test_json_to_a_closed_standard_output_is_refused_first(short_bag: Path) -> None:
