@@ -47,9 +47,9 @@ class Parser(argparse.ArgumentParser):
         return found, []
 
     def _spread(self, args: Sequence[str]) -> list[str]:
-        """Give every number of `--stiffness 0 250e3 FILE` the option's name; FILE is none."""
+        """Give every value of `--stiffness 0 unknown FILE` the option's name; FILE is none."""
         many = {
-            name
+            name: action.type
             for action in self._actions
             if isinstance(action, argparse._AppendAction) and action.type in (number, stiffness)
             for name in action.option_strings
@@ -57,7 +57,8 @@ class Parser(argparse.ArgumentParser):
         spread: list[str] = []
         option = ''
         for text in args:
-            if option and is_number(text):
+            word = text == 'unknown' and many.get(option) is stiffness
+            if option and (is_number(text) or word):
                 if spread[-1] == option:
                     spread.pop()
                 spread.append(f'{option}={text}')

@@ -34,7 +34,8 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         type=stiffness,
         metavar='N/m...',
         help='specimen stiffness: one for all records or one per record (250 kN/m is 250e3, 0 is '
-        'a free actuator or a shaking table, `unknown` leaves it open); wins over what files say',
+        'a free actuator or a shaking table, `unknown` leaves it open: `calibrate` takes that of '
+        'all records or of none, `diagnose` of none); wins over what files say',
     )
     parser.add_argument(
         '--channels',

@@ -106,6 +106,36 @@ def test_records_may_stand_after_stiffnesses(command: str, arguments: tuple[str,
     assert found.stiffness == [0.0, 250e3]
 
 
+@pytest.mark.parametrize('command', ['calibrate', 'diagnose', 'info', 'convert'])
+def test_unknown_is_a_stiffness_among_others(command: str) -> None:
+    """One value per record, and this word is one; where no such value can be, it is a name."""
+    out = ['out.csv'] if command == 'convert' else []
+    for values in (['0', 'unknown'], ['unknown', '250e3'], ['unknown', 'unknown']):
+        found = parse(command, 'a.csv', '--stiffness', *values, 'b.csv', *out)
+        assert found.records == ['a.csv', 'b.csv']
+        assert found.stiffness == [v if v == 'unknown' else float(v) for v in values]
+    assert parse('simulate', '--stiffness', 0, 'unknown').out == 'unknown'
+
+
+@pytest.mark.parametrize(
+    ('command', 'words'),
+    [
+        ('calibrate', 'one stiffness is given and another is unknown; calibrate the tests'),
+        ('diagnose', 'specimen stiffness is not known; give it with --stiffness'),
+    ],
+)
+def test_a_mixture_that_cannot_be_used_is_called_so(
+    run, short_bag: Path, tmp_path: Path, command: str, words: str
+) -> None:
+    """The sentence is about stiffnesses, not about a file called `unknown`."""
+    other = tmp_path / 'b.csv'
+    assert run('simulate', other, '--rate', 100, '--duration', 8, '--seed', 5).code == 0
+    done = run(command, short_bag, other, '--stiffness', 250e3, 'unknown')
+    assert done.code == 2
+    assert words in done.message
+    assert '`unknown`' in run(command, '--help').out
+
+
 def test_outputs_may_stand_after_stiffnesses() -> None:
     """The last name is the output, wherever options stand."""
     found = parse('convert', 'a.csv', '--stiffness', '-1', 'b.csv', '--unit', 'm', 'out.csv')
