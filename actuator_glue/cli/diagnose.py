@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -19,15 +20,17 @@ from actuator_glue.cli._heap import give_back
 from actuator_glue.cli._output import add_json, beside, note, progress, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
+from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
     from actuator_glue.api.diagnosis import Diagnosis
+    from actuator_glue.io.load import Stiffness
 
 EXAMPLES = (
     'diagnose free.csv clamped.csv --stiffness 0 250e3 --report report.html',
-    'diagnose free.csv clamped.csv --stiffness 0 250e3 --holdout earthquake.csv --json -',
+    'diagnose free.csv clamped.csv --stiffness 0 250e3 250e3 --holdout earthquake.csv --json -',
 )
 
 
@@ -41,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Input,
         metavar='RECORD',
         help='record that decides nothing and gives the error before and after; repeatable '
-        '(default: every fourth block of each record)',
+        '(default: every fourth block of each record). Where its file does not say its specimen '
+        'stiffness, --stiffness has one more value for it behind those of the records',
     )
     add_effects_file(parser)
     parser.add_argument(
@@ -129,21 +133,48 @@ def run(args: argparse.Namespace) -> int:
 def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
     """Load the fitting and the held-out records.
 
-    A stiffness for each record and each held-out one, or for the records alone: a held-out
-    record whose file does not say then has that of the last record.
+    `--stiffness` has one value for all, or one for each record and then one for each held-out one,
+    or values of the records alone.
+
+    Raises:
+        InputError: a record cannot be used, or the stiffness of a held-out one is not known.
     """
     given = list(args.stiffness or ())
-    own: list[float] = []
+    own: list[Stiffness] = []
     if args.holdout and len(given) > 1 and len(given) == len(args.records) + len(args.holdout):
         own = given[len(args.records) :]
         args.stiffness = given[: len(args.records)]
     records = load(args)
     if not args.holdout:
         return records, []
-    last = records[-1].stiffness
     args.records, args.stiffness = args.holdout, own or (given if len(given) == 1 else None)
-    held = load(args)
-    return records, [replace(r, stiffness=last) if r.stiffness is None else r for r in held]
+    return records, [_with_stiffness(held, records) for held in load(args)]
+
+
+def _with_stiffness(held: Record, records: Sequence[Record]) -> Record:
+    """Return a held-out record whose stiffness is known.
+
+    Where the fitted records have one, it is very likely that of this test, too, and is told; where
+    they have several, none is likelier than another.
+
+    Raises:
+        InputError: neither the file nor an option says it, and the fitted records have several.
+    """
+    if held.stiffness is not None:
+        return held
+    fitted = list(dict.fromkeys(record.stiffness for record in records))
+    if len(fitted) == 1 and fitted[0] is not None:
+        note(
+            f'{held.source}: held out, and its specimen stiffness is not said; that of the fitted '
+            f'records is taken, {fitted[0]:.12g} N/m'
+        )
+        return replace(held, stiffness=fitted[0])
+    values = ' '.join('K' if r.stiffness is None else f'{r.stiffness:.12g}' for r in records)
+    raise InputError(
+        f'{held.source}: the specimen stiffness of this held-out record is not known, and the '
+        f'fitted records do not have one in common; add one value for each held-out record to '
+        f'--stiffness, as in --stiffness {values} K'
+    )
 
 
 def _show(found: Diagnosis, args: argparse.Namespace) -> str:

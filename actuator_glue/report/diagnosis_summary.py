@@ -172,15 +172,14 @@ def next_command(found: DiagnosisData) -> str:
     """Return what to type next."""
     fitted = [(t.source, t.stiffness) for t in found.traces if not t.held_out]
     own = {source for source, _ in fitted}
-    held = [t.source for t in found.traces if t.held_out and t.source not in own]
+    held = [(t.source, t.stiffness) for t in found.traces if t.held_out and t.source not in own]
     if found.setup is not None and not found.setup.taken:
         tests = list(zip(found.setup.sources, found.setup.stiffness, strict=True))
         hold = dict.fromkeys(found.setup.hold)
         options = ['--hold', *hold] if len(hold) == 1 and 'hold' in found.setup.changed else []
         return command('diagnose', tests, *options, held=held)
     if found.verdict == 'undecided' and held:
-        alone = [(t.source, t.stiffness) for t in found.traces if t.source in held]
-        return command('diagnose', alone)
+        return command('diagnose', held)
     if found.learned:
         return command('diagnose', fitted, '--save-effects', 'learned.yaml', held=held)
     if not found.complete:

@@ -65,7 +65,7 @@ def command(
     verb: str,
     tests: Iterable[tuple[str, float | None]],
     *options: str,
-    held: Sequence[str] = (),
+    held: Iterable[tuple[str, float | None]] = (),
 ) -> str:
     """Return a command over tests as a shell takes it.
 
@@ -74,7 +74,7 @@ def command(
         tests: source and specimen stiffness [N/m] of each record; a stiffness that the file says
             may be None.
         options: what is typed behind them.
-        held: sources of records that are held out.
+        held: the same of records that are held out.
     """
     stiffness: dict[str, list[str]] = {}
     for source, k in tests:
@@ -83,8 +83,12 @@ def command(
             of.append(f'{k:g}')
     words = ['actuator-glue', verb, *(shlex.quote(path) for path in stiffness)]
     told = [k[0] for k in stiffness.values() if k]
+    apart = {_BEHIND.sub('', source): k for source, k in held}
     if len(told) == len(stiffness) and all(len(set(k)) == 1 for k in stiffness.values()):
-        words += ['--stiffness', *told]
-    for source in dict.fromkeys(_BEHIND.sub('', s) for s in held):
+        others = [f'{k:g}' for k in apart.values() if k is not None]
+        # One that all of them have is that of held-out records, too.
+        more = others if len(others) == len(apart) and len({*told, *others}) > 1 else []
+        words += ['--stiffness', *told, *more]
+    for source in apart:
         words += ['--holdout', shlex.quote(source)]
     return ' '.join([*words, *(shlex.quote(option) for option in options)])
