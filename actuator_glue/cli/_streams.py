@@ -1,4 +1,4 @@
-"""Standard output and standard error of a command, which may be closed, full, or read by nobody."""
+"""Standard output and error of a command, which may be closed, full, or read by nobody."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, TextIO, cast
 
 
@@ -26,7 +27,7 @@ class Stream:
         self.fault = ''
         # Opened in place of a closed stream, it takes that one's number, which the next file of
         # the command would have otherwise: what libraries print would land there.
-        self._under = open(os.devnull, 'w', encoding='utf-8') if under is None else under  # noqa: SIM115
+        self._under = Path(os.devnull).open('w', encoding='utf-8') if under is None else under  # noqa: SIM115
         self._gone = False
 
     def write(self, text: str) -> int:

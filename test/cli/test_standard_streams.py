@@ -53,7 +53,7 @@ def test_a_reader_that_has_gone_changes_neither_code_nor_files(
     monkeypatch.setattr(info, 'run', answer)
     read, write = os.pipe()
     os.close(read)
-    with open(write, 'w') as unread, monkeypatch.context() as patch:
+    with os.fdopen(write, 'w') as unread, monkeypatch.context() as patch:
         patch.setattr(sys, 'stdout', unread)
         assert main(['info', 'x.csv']) == own
         assert sys.stdout is unread
@@ -73,7 +73,7 @@ def test_a_full_standard_output_is_told_by_its_name(
         return own
 
     monkeypatch.setattr(info, 'run', answer)
-    with open('/dev/full', 'w') as full, monkeypatch.context() as patch:
+    with Path('/dev/full').open('w') as full, monkeypatch.context() as patch:
         patch.setattr(sys, 'stdout', full)
         assert main(['info', 'x.csv']) == 2
     assert done == ['report']
