@@ -73,7 +73,8 @@ def save_effects(path: Path | str, effects: Iterable[Effect]) -> None:
     Its folder is made if need be.
 
     Raises:
-        InputError: no path, the file cannot be written, or an effect has a compiled stage of its own.
+        InputError: no path, the file cannot be written, or an effect has a compiled stage of its
+            own.
     """
     chosen = tuple(effects)
     for effect in chosen:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, TypeGuard, TypeVar, cast
 
@@ -193,6 +193,29 @@ def source_name(source: str) -> str:
     """Return the last name of a source `folder/bag:/topic (record 1 of 2)`, folders left out."""
     path, mark, rest = source.partition(':/')
     return f'{path.rstrip("/").rpartition("/")[2]}{mark}{rest}'
+
+
+def source_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return the shortest name of each source that tells it from the others, as people read it.
+
+    That is its last name, with as many of its folders as another source of the same name needs.
+    """
+    given = list(dict.fromkeys(sources))
+    parts = {source: source.partition(':/')[0].rstrip('/').split('/') for source in given}
+
+    def name(source: str, folders: int) -> str:
+        path, mark, rest = source.partition(':/')
+        return f'{"/".join(parts[source][-1 - folders :])}{mark}{rest}' if path else source
+
+    found: dict[str, str] = {}
+    for source in given:
+        folders = 0
+        while folders < len(parts[source]) - 1 and any(
+            name(other, folders) == name(source, folders) for other in given if other != source
+        ):
+            folders += 1
+        found[source] = name(source, folders)
+    return found
 
 
 def check_period(period: float, source: str = '') -> float:

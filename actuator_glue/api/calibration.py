@@ -37,6 +37,7 @@ from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem
 from actuator_glue.inference.prior_conflict import conflict
 from actuator_glue.model.structure import Structure
+from actuator_glue.records import source_names
 
 Progress = Callable[[float], None]
 
@@ -126,6 +127,7 @@ def calibrate(
     doubtful = suspicions(tests)
     if left is not None:
         doubtful += unlike_rest(tests, left.noise_m)
+    called = source_names(r.source for r in cleaned)
     forces: tuple[RecordForce, ...] = ()
     if options.use_force:
         forces = force_errors(model, chains.best, cleaned, initial, settle)
@@ -144,7 +146,7 @@ def calibrate(
             ),
             *notes,
             *remark,
-            *(f.remark() for f in forces),
+            *(f.remark(called[f.source]) for f in forces),
         ),
         converged=converged,
         effects=model.effects,

@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.model.force_errors import transducer
 from actuator_glue.motion import METRES
-from actuator_glue.records import Array, Record, source_name
+from actuator_glue.records import Array, Record
 
 # Logarithm of a transducer's gain beyond which its scale is doubted.
 _OFF = 0.05
@@ -105,9 +105,9 @@ class RecordForce:
         rms = float(np.sqrt(np.mean((measured - gain * simulated[0] - offset) ** 2)))
         return cls(source, gain, offset, rms, rms / float(measured.std()))
 
-    def remark(self) -> str:
-        """Return the force as evidence in one line, for people."""
-        line = f'force of {source_name(self.source) or "a record"}: '
+    def remark(self, name: str) -> str:
+        """Return the force as evidence in one line, for people, who call the record so."""
+        line = f'force of {name or "a record"}: '
         if self.gain == 0.0:
             return f'{line}the model has none in phase with it, it says nothing'
         line += f'{self.rms_n:.3g} N rms are left, {100.0 * self.nrmse:.1f} % of its spread'

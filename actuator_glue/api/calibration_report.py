@@ -16,7 +16,7 @@ from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record, source_name
+from actuator_glue.records import Array, Record, source_name, source_names
 from actuator_glue.report import html
 from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.posterior_figure import posterior_figure
@@ -53,9 +53,14 @@ def bands_figure(found: CalibrationData, record: Record) -> tuple[Figure, float]
         record,
         Bands(band(moved, (LEVEL,)), total, level=LEVEL),
         even_zooms(record),
-        title=source_name(record.source),
+        title=_called(found, record),
     )
     return figure, float(inside.mean())
+
+
+def _called(found: CalibrationData, record: Record) -> str:
+    """Return what people read as the name of a record, beside those that were calibrated with."""
+    return source_names([record.source, *(s.source for s in found.sources)])[record.source]
 
 
 def posterior(found: CalibrationData) -> Figure:
@@ -184,8 +189,9 @@ def errors(error: FitError, left: ResidualStructure | None) -> html.Table:
         rows.append(['before: the command itself, no model', f'{1e6 * left.command_rms_m:.1f}'])
     rows.append(['after: the best draw', f'{1e6 * error.rms_m:.1f}'])
     if len(error.records) > 1:
+        called = source_names(of.source for of in error.records)
         for of in error.records:
-            name = source_name(of.source) or 'a record'
+            name = called[of.source] or 'a record'
             rows.append([f'... in {name}', f'{1e6 * of.rms_m:.1f}'])
     if left is not None:
         means = left.averaged and f',{left.averaged}'
@@ -266,7 +272,7 @@ def _left(found: CalibrationData) -> list[Left]:
         first = round(found.settle / record.period)
         error = record.measured - structure.simulate(best, record, initial=initial)
         k = f'k = {record.known_stiffness() / 1e3:g} kN/m'
-        title = f'{source_name(record.source) or "record"}: {k}'
+        title = f'{_called(found, record) or "record"}: {k}'
         out.append(Left(title, record.time[first:], error[first:], noise))
     return out
 
@@ -308,7 +314,7 @@ def page(found: CalibrationData, hybrid: str = '', next_command: str = '') -> ht
         pictures = []
         for record in found.records:
             figure, inside = bands_figure(found, record)
-            name = source_name(record.source) or 'a record'
+            name = _called(found, record) or 'a record'
             caption = (
                 f'{name}: 95 % bands; the total one holds {100 * inside:.1f} % of the samples.'
             )

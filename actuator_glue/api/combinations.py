@@ -28,7 +28,7 @@ from actuator_glue.inference.moments import moments
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.motion import METRES, speaking
-from actuator_glue.records import Array, Record, source_name
+from actuator_glue.records import Array, Record, source_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -282,11 +282,12 @@ def _marginals(
 def _pushed(records: list[Record]) -> tuple[float | None, list[str]]:
     """Return the stiffness that the recorded forces suggest [N/m], and that in words."""
     seen, told = [], []
+    called = source_names(record.source for record in records)
     for number, record in enumerate(records, start=1):
         found = pull(record)
         if found is not None and record.motion == METRES:
             seen.append(abs(found))
-            name = source_name(record.source) or f'record {number}'
+            name = called[record.source] or f'record {number}'
             told.append(
                 f'{name}: force over displacement is {abs(found):.3g} N/m; --stiffness '
                 f'{abs(found):.3g} would tell all that two tests can'

@@ -18,7 +18,7 @@ from actuator_glue.api.calibration_report import (
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import source_name
+from actuator_glue.records import source_names
 from actuator_glue.report import html
 from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.posterior_figure import posterior_figure
@@ -79,8 +79,9 @@ def _at_zero(found: CombinationsData) -> list[str]:
 def _left(found: CombinationsData) -> list[Left]:
     noise = None if found.structure is None else found.structure.noise_m
     out = []
+    called = source_names(record.source for record in found.records)
     for record, error in list(zip(found.records, found.residuals, strict=True))[:_PANELS]:
-        title = f'{source_name(record.source) or "record"}: k not known'
+        title = f'{called[record.source] or "record"}: k not known'
         out.append(Left(title, record.time[len(record) - len(error) :], error, noise))
     return out
 

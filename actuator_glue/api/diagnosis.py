@@ -426,4 +426,4 @@ def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTr
             for r in cleaned
         ]
     known = [r for r in cleaned if r.source in fitted]
-    return records_tracking(found.joint, found.names, found.model, known)
+    return records_tracking(found.joint, found.names, found.model, known, cleaned)

@@ -20,7 +20,7 @@ from actuator_glue.model.effects import Scale, scale
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult
-from actuator_glue.records import Array, Record, source_name
+from actuator_glue.records import Array, Record, source_name, source_names
 
 if TYPE_CHECKING:
     from actuator_glue.report import html
@@ -52,7 +52,7 @@ class RecordTracking:
     """How the actuator follows the command of one record.
 
     Attributes:
-        source: the record.
+        source: the record, by the shortest name that tells it from the others.
         predicted: each number over the draws.
         measured: the same of the record itself, where it has it.
     """
@@ -96,7 +96,11 @@ def ready(records: Sequence[Record]) -> list[Record]:
 
 
 def records_tracking(
-    draws: Array, names: Sequence[str], structure: Structure, records: Sequence[Record]
+    draws: Array,
+    names: Sequence[str],
+    structure: Structure,
+    records: Sequence[Record],
+    among: Sequence[Record] = (),
 ) -> tuple[RecordTracking, ...]:
     """Return how the actuator follows the command of each record, for every kind of result alike.
 
@@ -109,8 +113,10 @@ def records_tracking(
         names: parameter of each column; those of a likelihood are passed over.
         structure: the model.
         records: the tests, as `ready` returns them.
+        among: tests that their names tell them from, these among them; none for these.
     """
     out = []
+    called = source_names(r.source for r in among or records)
     sizes = scale(records, draws[:, :4].mean(axis=0))
     for record in records:
         initial = initial_state(record)
@@ -118,7 +124,8 @@ def records_tracking(
         settle = min(settle, len(record) // 2)
         of = record_tracking(draws, names, structure, record, initial, settle)
         k = record.known_stiffness()
-        out.append(replace(of, predicted=_sines(draws, names, structure, sizes, k) | of.predicted))
+        sines = _sines(draws, names, structure, sizes, k)
+        out.append(replace(of, source=called[record.source], predicted=sines | of.predicted))
     return tuple(out)
 
 

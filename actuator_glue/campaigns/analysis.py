@@ -12,7 +12,7 @@ from actuator_glue.campaigns.grouping import Task
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.model.parameters import NAMES
-from actuator_glue.records import Array, Record, source_name
+from actuator_glue.records import Array, Record, source_names
 
 if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration
@@ -49,7 +49,8 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
     wanted = task.analysis
     found = calibrate(fitted, **wanted['calibrate'])
     row = {**_described(task, fitted), **_calibrated(found)}
-    stiffest = source_name(max(fitted, key=Record.known_stiffness).source)
+    called = source_names(r.source for r in fitted)
+    stiffest = called[max(fitted, key=Record.known_stiffness).source]
     row |= _tracked(found.tracking, stiffest)
     if wanted['draws']:
         _whole(keep / 'draws' / f'{key}.npz', found.save)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.verdict.traces import Trace
-from actuator_glue.records import Array, source_name
+from actuator_glue.records import Array, source_names
 from actuator_glue.report import style
 from actuator_glue.report.quantity import said_in
 from actuator_glue.report.style import (
@@ -44,9 +44,10 @@ def _text(found: DiagnosisData, side: str) -> str:
     return side if moved(found) else 'Eq. (2), refitted'
 
 
-def _title(trace: Trace, width: float) -> str:
+def _title(found: DiagnosisData, trace: Trace, width: float) -> str:
     tail = f': k = {trace.stiffness / 1e3:g} kN/m{", held out" if trace.held_out else ""}'
-    return style.fit(source_name(trace.source), width, tail=tail)
+    called = source_names(t.source for t in found.traces)
+    return style.fit(called[trace.source], width, tail=tail)
 
 
 def _legend(figure: Figure, *panels: Axes, scale: float = 1.0, columns: int = 3) -> None:
@@ -85,7 +86,7 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
         left.plot(trace.time[part], residual, color=color, lw=0.7, label=_text(found, side))
     left.set_xlabel('time [s]')
     left.set_ylabel('measured less model [um]')
-    left.set_title(_title(trace, room - 0.7))
+    left.set_title(_title(found, trace, room - 0.7))
     bars = [
         (_text(found, side), getattr(error, side), getattr(error, f'{side}_ci'), color)
         for side, color in _sides(found)
@@ -121,7 +122,7 @@ def residuals_in_time(found: DiagnosisData) -> Figure:
         for side, color in _sides(found):
             t, residual = _lines(trace, trace.time, trace.measured - getattr(trace, side))
             axes.plot(t, 1e6 * residual, color=color, lw=0.6, label=_text(found, side))
-        axes.set_title(_title(trace, style.WIDTH - 0.7))
+        axes.set_title(_title(found, trace, style.WIDTH - 0.7))
         axes.set_ylabel('residual [um]')
     grid[-1].set_xlabel('time [s]')
     _legend(figure, grid[0])
@@ -152,7 +153,7 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
         for side, color in _sides(found):
             f, density = _density(trace, trace.measured - getattr(trace, side))
             axes.loglog(f, 1e6 * density, color=color, lw=0.8, label=_text(found, side))
-        axes.set_title(_title(trace, style.WIDTH / columns - 0.5))
+        axes.set_title(_title(found, trace, style.WIDTH / columns - 0.5))
         axes.set_xlabel('frequency [Hz]')
         style.decades(axes.xaxis)
         style.decades(axes.yaxis)
@@ -208,7 +209,7 @@ def loops(found: DiagnosisData) -> Figure:
                 color=color,
                 label=_text(found, side),
             )
-        left.set_title(_title(trace, style.WIDTH - 0.7))
+        left.set_title(_title(found, trace, style.WIDTH - 0.7))
         left.set_xlabel('displacement [mm] (slow part)')
         left.set_ylabel('residual [um]')
         right.set_xlabel('velocity [mm/s]')

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.json_value import Json
 from actuator_glue.online.stream import structure_name
-from actuator_glue.records import source_name
+from actuator_glue.records import source_names
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.diagnosis_summary import advice, closing, first_page
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
@@ -43,7 +43,7 @@ def _um(value: float) -> str:
 
 
 def _error(found: DiagnosisData) -> Section:
-    e = found.error
+    e, called = found.error, _called(found)
     sides = (
         ('before: Eq. (2), refitted', e.before, e.before_ci, found.coverage[0]),
         (
@@ -68,7 +68,7 @@ def _error(found: DiagnosisData) -> Section:
         Text(f'Share of the removable error removed: {100 * e.removable_removed:.1f} %.'),
         Table(
             ['held-out record', 'before [um]', 'after [um]'],
-            [[source_name(source), _um(b), _um(a)] for source, b, a in e.records],
+            [[called[source], _um(b), _um(a)] for source, b, a in e.records],
             'The same for each record.',
         ),
         Picture.of(figures.bands(found), '95 % predictive bands where both models differ most.'),
@@ -200,7 +200,7 @@ def _structures(found: DiagnosisData) -> Table:
 
 
 def _residual(found: DiagnosisData) -> Section:
-    a = found.alarm
+    a, called = found.alarm, _called(found)
     tests = [
         [text, plain(factor * a.tests[name])]
         for name, (text, factor) in _STATISTICS.items()
@@ -208,7 +208,7 @@ def _residual(found: DiagnosisData) -> Section:
     ]
     rows = [
         [
-            source_name(r['source']),
+            called[r['source']],
             _um(r['structure']),
             _um(r['noise']),
             ' to '.join(f'{f:g}' for f in r['frequency_hz']),
@@ -251,10 +251,18 @@ def _residual(found: DiagnosisData) -> Section:
     )
 
 
+def _called(found: DiagnosisData) -> dict[str, str]:
+    """Return what people read as the name of each record."""
+    sources = [t.source for t in found.traces]
+    sources += [source for source, _, _ in found.error.records]
+    return source_names([*sources, *(r['source'] for r in found.remaining['records'])])
+
+
 def _records(found: DiagnosisData) -> Section:
+    called = _called(found)
     rows = [
         [
-            source_name(t.source),
+            called[t.source],
             'held out' if t.held_out else 'fitted',
             f'{t.stiffness / 1e3:g}',
             str(len(t.time)),

@@ -64,7 +64,7 @@ def _model(data: Data, final: Trial) -> Model:
     own = final.own
     pairs = zip(data.records, data.recorded, strict=True)
     records = tuple(whole for r, whole in pairs if any(r is o for o in own.records))
-    return OneRecord(final.structure, own.own, records)
+    return OneRecord(final.structure, own.own, records, data.recorded)
 
 
 def _left(effect: Measured, data: Data, simulated: Array) -> float:

@@ -110,7 +110,7 @@ def _row(refits: Refits, trial: Trial, rest: Structure, tried: int) -> Row:
 
 def _fitted(refits: Refits, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:
     structure = refits.structure(*start.effects, name)
-    model = OneRecord(structure, name, records)
+    model = OneRecord(structure, name, records, refits.data.records)
     thetas = refits.screen(start, name)[1]
     found = fit(refits.data, model, thetas)
     assert refits.scorer is not None

@@ -19,7 +19,7 @@ from actuator_glue.inference.least_squares.fit import Fit, base_fit
 from actuator_glue.inference.least_squares.stretches import stretches
 from actuator_glue.json_value import JsonObject
 from actuator_glue.model.effects import scale
-from actuator_glue.records import Hold, source_name
+from actuator_glue.records import Hold, source_names
 
 _RUNS = {
     'linear': 'running linearly between its samples (--hold linear)',
@@ -96,7 +96,8 @@ class WrongSetup(JsonObject):
         parts = []
         if 'stiffness' in self.changed:
             pairs = zip(self.sources, self.stiffness, strict=True)
-            order = ', '.join(f'{k:g} N/m for {source_name(s)}' for s, k in pairs)
+            called = source_names(self.sources)
+            order = ', '.join(f'{k:g} N/m for {called[s]}' for s, k in pairs)
             parts.append(f'specimen stiffnesses exchanged ({order})')
         if 'hold' in self.changed:
             parts.append(f'the command {_RUNS["linear" if "linear" in self.hold else "zoh"]}')

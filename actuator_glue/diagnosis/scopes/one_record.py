@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record, source_name
+from actuator_glue.records import Array, Record, source_names
 
 
 class OneRecord:
@@ -18,17 +20,25 @@ class OneRecord:
         structure: with all effects, learned terms among them.
         own: the effect that acts in `records` only.
         records: these records.
+        among: all records, from which the names of these tell them.
     """
 
-    def __init__(self, structure: Structure, own: str, records: tuple[Record, ...]) -> None:
+    def __init__(
+        self,
+        structure: Structure,
+        own: str,
+        records: tuple[Record, ...],
+        among: Sequence[Record] = (),
+    ) -> None:
         self._inner = structure
         self.own, self.records = own, records
+        self._called = source_names(r.source for r in (*records, *among))
         self._off = [float(p.neutral or 0.0) for p in CATALOGUE[own].parameters]
 
     @property
     def scope(self) -> str:
         """Which effect acts in which record only."""
-        return f'{self.own} in {source_name(self.records[0].source) or "one record"} only'
+        return f'{self.own} in {self._called[self.records[0].source] or "one record"} only'
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

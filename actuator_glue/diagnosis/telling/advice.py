@@ -21,7 +21,7 @@ from actuator_glue.diagnosis.verdict.rules import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.records import source_name
+from actuator_glue.records import source_names
 
 _TELLING = Thresholds().tie_nats
 
@@ -200,8 +200,9 @@ def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
 
 def zeros(error: HeldOutError, material: float) -> tuple[str, ...]:
     """Name the held-out records whose own zero (offset and drift) matters."""
+    called = source_names(source for source, _, _ in error.records)
     return tuple(
-        f'{source_name(source)}: {1e6 * after:.1f} um are left, {1e6 * left:.1f} um without the '
+        f'{called[source]}: {1e6 * after:.1f} um are left, {1e6 * left:.1f} um without the '
         'offset and the drift of its own zero, which no other record tells'
         for (source, _, after), left in zip(error.records, error.zeros, strict=True)
         if after**2 - left**2 > material**2

@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.rules import excuse, likely, misses
 from actuator_glue.diagnosis.verdicts import Verdict
 from actuator_glue.json_value import Json
-from actuator_glue.records import source_name
+from actuator_glue.records import source_names
 
 
 class Told(Protocol):
@@ -68,12 +68,18 @@ class Told(Protocol):
         ...
 
 
+def _called(found: Told, sources: Sequence[str]) -> dict[str, str]:
+    """Return what people read as the names of some records, and of the others."""
+    return source_names([*sources, *(r['source'] for r in found.remaining['records'])])
+
+
 def _named(effect: Finding, found: Told) -> str:
     equations = [term.numbers for term in found.learned if term.name == effect.name]
     if equations:
         term = f'a learned term {effect.name} ({equations[0]})'
         return f'{effect.cause} in another shape, {term}' if effect.cause else term
-    where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
+    called = _called(found, effect.records)
+    where = f' in {", ".join(called[r] for r in effect.records)} only' if effect.records else ''
     if not likely(effect):
         return (
             f'something that looks most like {effect.name} ({_share(effect.probability)}){where}'
@@ -133,7 +139,8 @@ def _verdict(found: Told) -> str:
     names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
     enough = 'the model is enough'
     if found.onset is not None:
-        when = f' since {found.onset.time:.1f} s of {source_name(found.onset.source)}'
+        source = found.onset.source
+        when = f' since {found.onset.time:.1f} s of {_called(found, [source])[source]}'
         names += when if names else ''
         enough += f'{when}, where its parameters changed'
     change = f'held-out error {_errors(found, bool(names))}, {_noise(found)}'
