@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from datetime import UTC, datetime
 from fnmatch import fnmatch
@@ -110,36 +111,58 @@ def files_below(given: Sequence[Path | str], rules: Sequence[FileRule]) -> Itera
         if not one.exists():
             raise InputError(f'{one}: there is no such file or folder')
         if is_bag(one) or not one.is_dir():
-            found, root = iter([one]), one.parent
+            found, root = [one], one.parent
         else:
-            found, root = _walk(one, one, rules), one
-        empty = True
+            found, root = _walk(one, rules), one
         for path in found:
-            empty = False
-            whole = str(path.resolve())
+            whole = os.path.realpath(path)
             if whole not in seen:
                 seen.add(whole)
                 yield _read_as(whole, path.relative_to(root).as_posix(), rules)
-        if empty:
+        if not found:
             raise InputError(
                 f'{one}: no record in this folder; known are {", ".join(formats())}, bags, and '
                 'what a rule of the recipe matches'
             )
 
 
-def _walk(folder: Path, root: Path, rules: Sequence[FileRule]) -> Iterator[Path]:
+def _walk(root: Path, rules: Sequence[FileRule]) -> list[Path]:
+    """Return the record files and bags of a folder and of those below it, sorted.
+
+    Each is there once, under its shortest path, whatever links lead to it or to its folders, also
+    where one leads back. What begins with a dot or, as the lock files of spreadsheets, with `~$`,
+    is none.
+    """
     known = formats()
-    for path in sorted(folder.iterdir()):
-        if path.name.startswith('.'):
-            continue
-        if is_bag(path):
-            yield path
-        elif path.is_dir():
-            yield from _walk(path, root, rules)
-        elif path.suffix.lower() in known or any(
-            _matches(path.relative_to(root).as_posix(), rule.match) for rule in rules
-        ):
-            yield path
+    found: dict[str, Path] = {}
+    gone: set[str] = set()
+    level = [root]
+    while level:  # folders of one depth after the other: the first path to a file is the shortest
+        below: list[Path] = []
+        for folder in level:
+            real = os.path.realpath(folder)
+            if real in gone:
+                continue
+            gone.add(real)
+            for path in sorted(folder.iterdir(), key=_links_last):
+                if path.name.startswith(('.', '~$')):
+                    continue
+                if is_bag(path) or (not path.is_dir() and _is_record(path, root, rules, known)):
+                    found.setdefault(os.path.realpath(path), path)
+                elif path.is_dir():
+                    below.append(path)
+        level = sorted(below, key=_links_last)
+    return sorted(found.values())
+
+
+def _links_last(path: Path) -> tuple[bool, Path]:
+    return path.is_symlink(), path
+
+
+def _is_record(path: Path, root: Path, rules: Sequence[FileRule], known: Container[str]) -> bool:
+    """Whether a file has the suffix of a format, or a rule matches it."""
+    name = path.relative_to(root).as_posix()
+    return path.suffix.lower() in known or any(_matches(name, rule.match) for rule in rules)
 
 
 def _matches(name: str, pattern: str) -> bool:

@@ -56,9 +56,10 @@ def read_text(path: Path, what: str, hint: str, folder: str) -> str:
             raise InputError(f'{path}: {size / 1e3:.0f} kB are no {what}; {hint}')
         return path.read_text(text_encoding(path))
     except OSError as error:
+        names = ', '.join(shipped(folder))
+        ours = f', or one of {names}' if names else ''
         raise InputError(
-            f'{path}: {what} cannot be read ({error.strerror}); give a YAML file, or one of '
-            f'{", ".join(shipped(folder))}'
+            f'{path}: {what} cannot be read ({error.strerror}); give a YAML file{ours}'
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: {what} is not text in UTF-8') from error

@@ -174,3 +174,37 @@ def test_records_that_are_not_there_are_told(tmp_path: Path) -> None:
         tasks_of([tmp_path / 'nothing'], Recipe())
     with pytest.raises(ag.InputError, match='no record in this folder'):
         tasks_of([tmp_path], Recipe())
+
+
+def test_links_lead_to_each_file_once(tmp_path: Path) -> None:
+    """Under its shortest path, a real one before a link; back to where one was, and nowhere."""
+    rec, archive = tmp_path / 'rec', tmp_path / 'archive'
+    for folder in (rec / 'z' / 'deep', archive):
+        folder.mkdir(parents=True)
+    for file in (rec / 'x.csv', rec / 'z' / 'deep' / 'y.csv', archive / 'old.csv'):
+        file.write_text('time_s,command_mm,measured_mm\n')
+    (rec / 'loop').symlink_to('.')
+    (rec / 'z' / 'up').symlink_to('..')
+    (rec / 'a').symlink_to('z')
+    (rec / 'more').symlink_to(archive)
+    (rec / 'short').symlink_to('z/deep')
+    (rec / 'a.csv').symlink_to('x.csv')
+    (rec / 'circle.csv').symlink_to('circle.csv')
+    tasks = tasks_of([rec], Recipe())
+    assert [t.group for t in tasks] == ['circle.csv', 'more/old.csv', 'short/y.csv', 'x.csv']
+    for task in tasks[:1]:
+        with pytest.raises(ag.InputError):
+            task.members[0].records()
+
+
+def test_lock_files_of_spreadsheets_are_no_records(tmp_path: Path) -> None:
+    """Excel keeps `~$test.xlsx` beside a file that is open."""
+    for name in ('test.xlsx', '~$test.xlsx', '.hidden.csv'):
+        (tmp_path / name).write_bytes(b'PK')
+    assert [t.group for t in tasks_of([tmp_path], Recipe())] == ['test.xlsx']
+
+
+def test_a_recipe_that_is_not_there_offers_only_what_there_is(tmp_path: Path) -> None:
+    """No recipe comes with the package."""
+    with pytest.raises(ag.InputError, match=r'no\.yaml: recipe cannot be read .*a YAML file$'):
+        read_recipe(tmp_path / 'no.yaml')
