@@ -155,6 +155,11 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
     for name in ('delimiter', 'actuator'):
         if values.get(name) is not None and not isinstance(values[name], str):
             raise InputError(f'{where}: {name} must be text, not {values[name]!r}')
+    if values.get('delimiter') == '':
+        raise InputError(
+            f'{where}: delimiter is empty; leave it out, and what parts the columns is found, or '
+            'give the text between them'
+        )
     if values.get('sample_number') is not None:
         _column(values['sample_number'], f'{where}: sample_number')
     if values.get('stiffness') is not None:

@@ -25,6 +25,8 @@ from actuator_glue.records import Array, Hold, Record
 
 # A channel "at rest" may move by this share of its range: noise does, a test does not.
 _REST_SHARE = 0.1
+# A rate that is wanted is another one than the file's if it differs by this share.
+_OTHER_RATE = 1e-3
 _NEEDED = ('time', 'command', 'measured')
 
 
@@ -74,7 +76,7 @@ def read(
             uneven clock is refused. The record's source tells it, and its command runs straight
             between samples where nothing else is given. Band-limited; `(27.0, 'lines')` draws
             straight lines between samples.
-        warn: called with a line that tells what resampling cost.
+        warn: called with a line that tells what resampling cost, or that an even clock was left.
 
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
@@ -95,6 +97,12 @@ def read(
             values, period = made.values, made.period
             warn(f'{path}: {made.told()}')
             source, said_hold = f'{path} ({made.name()})', said_hold or 'linear'
+        else:
+            if way is not None and abs(period * way[0] - 1.0) > _OTHER_RATE:
+                warn(
+                    f'{path}: its clock is even already, at {1.0 / period:.6g} Hz, and stays so: '
+                    '--resample makes jittered clocks even and changes no other rate; leave it out'
+                )
     elif way is not None:
         raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():

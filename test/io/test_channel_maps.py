@@ -61,6 +61,7 @@ def test_a_map_reads_any_text(tmp_path: Path, said: dict[str, str]) -> None:
         ({'hold': 'cubic'}, 'use one of'),
         ({'stiffness': -1}, 'outside'),
         ({'delimiter': 5}, 'must be text'),
+        ({'delimiter': ''}, 'map.yaml: channel map: delimiter is empty; leave it out'),
     ],
 )
 def test_maps_that_cannot_be_used(change: dict[str, object], words: str) -> None:

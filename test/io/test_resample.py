@@ -226,5 +226,11 @@ def test_the_command_line_resamples_on_request_alone(
     assert main(['convert', str(path), str(tmp_path / 'b.csv'), '--resample', '27']) == 0
     assert 'more than 5 % of an amplitude is lost' in capsys.readouterr().err
     assert len(ag.load(tmp_path / 'b.csv')) == int(TIME[-1] * 27) + 1
-    even = ag.load(tmp_path / 'b.csv', resample=30)
+    with pytest.warns(UserWarning, match='its clock is even already, at 27 Hz, and stays so'):
+        even = ag.load(tmp_path / 'b.csv', resample=30)
     assert (even.rate, even.source) == (27.0, str(tmp_path / 'b.csv'))
+    again = ['convert', str(tmp_path / 'b.csv'), str(tmp_path / 'c.csv'), '--resample']
+    assert main([*again, '30']) == 0
+    assert '--resample makes jittered clocks even and changes no other' in capsys.readouterr().err
+    assert main([*again, '27', '--force']) == 0  # what was asked for is so
+    assert capsys.readouterr().err == ''
