@@ -19,6 +19,9 @@ import yaml
 import actuator_glue as ag
 from actuator_glue.cli.main import build_parser, main
 from actuator_glue.errors import InputError
+from actuator_glue.io.load import load_records
+from actuator_glue.streams.layout_file import read_layout
+from actuator_glue.streams.play import check
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *sorted((ROOT / 'docs').rglob('*.md'))]
@@ -237,6 +240,25 @@ def test_short_commands_do_what_the_page_says(page: str, laboratory: Path) -> No
             assert run(words) == 0, words
             ran += 1
     assert ran
+
+
+@pytest.mark.parametrize('page', PAGES, ids=name)
+def test_what_is_sent_has_the_rate_of_its_layout(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of records that the page makes, or docs/start.md; the rest of sending needs a receiver."""
+    monkeypatch.chdir(tmp_path)
+    found = re.findall(r'actuator-glue ((?:simulate|send) [^`\n]+)', page.read_text('utf-8'))
+    lines = [shlex.split(line, comments=True) for line in found]
+    sent = {words[1] for words in lines if words[0] == 'send'}
+    if 'test.csv' in sent:
+        assert main(['simulate', 'test.csv', '--duration', '1']) == 0
+    for words in lines:
+        if words[0] == 'simulate' and words[1] in sent:
+            assert main([*words, '--duration', '1', '--force']) == 0, words
+        if words[0] == 'send' and '--layout' in words:
+            (record,) = load_records(words[1])
+            check(record, read_layout(words[words.index('--layout') + 1]))
 
 
 @pytest.mark.slow
