@@ -6,11 +6,10 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any, TextIO, cast
 
 
-class Stream:
+class StandardStream:
     """A text stream that never ends a command: what cannot be written is dropped from then on.
 
     A reader that has gone, as in `| head -1`, is no fault: nobody misses what comes after. Any
@@ -27,7 +26,7 @@ class Stream:
         self.fault = ''
         # Opened in place of a closed stream, it takes that one's number, which the next file of
         # the command would have otherwise: what libraries print would land there.
-        self._under = Path(os.devnull).open('w', encoding='utf-8') if under is None else under  # noqa: SIM115
+        self._under = os.fdopen(os.open(os.devnull, os.O_WRONLY), 'w') if under is None else under
         self._gone = False
 
     def write(self, text: str) -> int:
@@ -72,10 +71,10 @@ class Stream:
 
 
 @contextmanager
-def standard_streams() -> Iterator[tuple[Stream, Stream]]:
-    """Put a `Stream` around standard output and standard error; yield both."""
+def standard_streams() -> Iterator[tuple[StandardStream, StandardStream]]:
+    """Put a `StandardStream` around standard output and standard error; yield both."""
     before = sys.stdout, sys.stderr
-    out, err = Stream(before[0]), Stream(before[1])
+    out, err = StandardStream(before[0]), StandardStream(before[1])
     sys.stdout, sys.stderr = cast(TextIO, out), cast(TextIO, err)
     try:
         yield out, err

@@ -18,7 +18,7 @@ from pathlib import Path
 from actuator_glue import cli
 from actuator_glue.arguments import claim_outputs
 from actuator_glue.cli._parser import Parser, examples
-from actuator_glue.cli._streams import Stream, standard_streams
+from actuator_glue.cli._streams import StandardStream, standard_streams
 from actuator_glue.errors import InputError
 from actuator_glue.motion import METRES, speak, spoken
 
@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def _run(argv: list[str], out: Stream) -> int:
+def _run(argv: list[str], out: StandardStream) -> int:
     """Return the exit code of a command; what it raises becomes one line."""
     # Our matrices are small and our own threads use the cores: those of the linear algebra on top
     # would only wait for each other (a diagnosis takes 1.7 times the processor time).
