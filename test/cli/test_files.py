@@ -217,4 +217,4 @@ def test_stiffness_and_options_that_cannot_be_used(run, tmp_path: Path, problem_
     assert '--stiffness N/m' in run('calibrate', unknown).message
     assert '--stiffness N/m' in run('replay', unknown).message
     assert 'channel map' in run('info', one, '--channels', tmp_path / 'no.yaml').message
-    assert 'cannot be written' in run('info', one, '--json', one / 'x.json').message
+    assert 'is no folder' in run('info', one, '--json', one / 'x.json').message
