@@ -46,7 +46,8 @@ _BETTER = 0.7
 # step, of so many stamps that those of their jitter are this many times smaller.
 _LOST = 0.6  # periods
 _SURE = 6.0
-_AROUND = 16  # stamps at least
+_AROUND = 40  # stamps at least: late ones come in clusters
+_LATE = 11  # stamps, of which one late one must be fewer than half with those behind it
 _ROUNDED = 1.02  # of a rounding step
 _BLOCK = 100  # stamps of which the earliest and the latest are looked at
 _ROUGH = 1.4826  # from the median deviation to a standard one
@@ -357,12 +358,17 @@ def _refuse_lost(time: Array, even: Array, where: str) -> None:
     off, period, count = time - time[0] - even, float(even[1] - even[0]), len(time)
     if _least_range(even, off) <= _ROUNDED * rounding(time):
         return  # a clock beside the step of its stamps slips by one of them now and then
-    jitter = float(np.std(np.diff(off))) / np.sqrt(2.0)
-    around = max(_AROUND, int(np.ceil(2.0 * (_SURE * jitter / (_LOST * period)) ** 2)))
-    if 2 * around > count:
+    rough = np.diff(off)
+    # A stamp that came late holds up a few behind it; what is lost moves all of them.
+    off = scipy.ndimage.median_filter(off, _LATE, mode='nearest')
+    spreads = _ROUGH * float(np.median(np.abs(rough))), float(np.std(np.diff(off)))
+    jitter = max(spreads) / np.sqrt(2.0)
+    around = max(_AROUND, int(np.ceil(4.0 * (_SURE * jitter / (_LOST * period)) ** 2)))
+    least_around = _AROUND // 2
+    if around + least_around > count:
         return  # so few stamps that are off so far show no lost sample
     sums = np.cumsum(np.append(0.0, off))
-    at = np.arange(1, count)  # the first sample behind a place
+    at = np.arange(least_around, count - least_around + 1)  # the first sample behind a place
     before, behind = np.minimum(at, around), np.minimum(count - at, around)
     step = (sums[at + behind] - sums[at]) / behind - (sums[at] - sums[at - before]) / before
     # Stamps that wander, as of a log written in bursts, have many such steps.
@@ -373,13 +379,15 @@ def _refuse_lost(time: Array, even: Array, where: str) -> None:
     first = int(beyond.argmax())
     if beyond[first] <= 1.0:
         return
-    near = slice(max(0, first - around // 4), first + around // 4 + 1)
-    moved = np.diff(off)[near] * np.sign(step[first])
+    first_behind = int(at[first])
+    near = slice(max(0, first_behind - 1 - around // 4), first_behind + around // 4)
+    moved = rough[near] * np.sign(step[first])
     place = near.start + int(moved.argmax())
     many = abs(float(step[first])) / period
     what = 'missing' if step[first] > 0.0 else 'there twice'
+    close = 'after' if jitter < 0.25 * period else 'near'  # one late stamp looks like a lost one
     raise InputError(
-        f'{where}: about {max(round(many), 1)} sample(s) are {what} after sample {place} '
+        f'{where}: about {max(round(many), 1)} sample(s) are {what} {close} sample {place} '
         f'({time[place]:.9g} s): from there on the stamps are {1e3 * abs(step[first]):.2g} ms off '
         'the even clock before; cut the record there, and give the parts as records of their own'
     )
