@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, TypeGuard, TypeVar, cast
@@ -122,9 +121,13 @@ def _universal(time: Any) -> Any:
     return time if ahead is None else time.replace(tzinfo=None) - ahead
 
 
-def _of_day(time: datetime.time) -> float:
+def _is_of_day(time: Any) -> bool:
+    return hasattr(time, 'utcoffset') and hasattr(time, 'hour') and not hasattr(time, 'year')
+
+
+def _of_day(time: Any) -> float:
     """Return a time of day in seconds."""
-    return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+    return float(3600 * time.hour + 60 * time.minute + time.second + 1e-6 * time.microsecond)
 
 
 def _clock(time: ArrayLike, source: str) -> tuple[float, int]:
@@ -143,11 +146,7 @@ def _clock(time: ArrayLike, source: str) -> tuple[float, int]:
     column = np.asarray(time)
     if column.ndim != 1:
         raise InputError(f'{where}: time must be one-dimensional, got shape {column.shape}')
-    if (
-        column.dtype.kind == 'O'
-        and len(column)
-        and all(isinstance(t, datetime.time) for t in column)
-    ):
+    if column.dtype.kind == 'O' and len(column) and all(map(_is_of_day, column)):
         column = np.array([_of_day(t) for t in column])
     elif column.dtype.kind == 'O' and all(hasattr(t, 'utcoffset') for t in column):
         try:

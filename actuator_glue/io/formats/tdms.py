@@ -94,10 +94,10 @@ def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
 
     npTDMS keeps what the last segment says, and a start belongs to the first sample behind it.
     """
-    reader = library('nptdms.reader', path).TdmsReader
+    reader: Any = library('nptdms.reader', path).TdmsReader
     found: dict[str, list[tuple[int, dict[str, Any]]]] = {}
 
-    class Watched(reader):  # type: ignore[misc,valid-type]  # an optional library's
+    class SegmentHeadings(reader):
         """Reads the segments' headings, and keeps what each one says."""
 
         def _update_object_metadata(self, segment: Any) -> None:
@@ -112,7 +112,7 @@ def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
             super()._update_object_properties(properties)
 
     with reading(path, _NAME), path.open('rb') as file:
-        Watched(file).read_metadata()
+        SegmentHeadings(file).read_metadata()
     return found
 
 
