@@ -28,6 +28,7 @@ _MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<HIQQ')  # channel, sequence, log time, publish time; then the data
 _MAX_CHUNK = 1 << 29  # bytes; a chunk that claims more is damaged or hostile
+_PIECE = 1 << 20  # bytes unpacked at once where only their number counts
 # Schema of a channel whose messages have none, as JSON and plain bytes may.
 NO_SCHEMA = Schema(id=0, data=b'', encoding='', name='')
 _ZSTD = b'(\xb5/\xfd'
@@ -80,16 +81,29 @@ class Scan:
             raise InputError(f'{self.path}: cannot be read ({error.strerror})') from error
 
     def _unpacked(self, packed: BinaryIO) -> Iterator[tuple[Schema, Channel, Message]]:
-        """Yield the messages of a file that rosbag2 has compressed as a whole."""
+        """Yield the messages of a file that rosbag2 or another tool has compressed as a whole.
+
+        Raises:
+            InputError: it is no such file.
+        """
         import zstandard
 
         head = packed.read(32)
-        packed.seek(0)
-        size = zstandard.frame_content_size(head) if head.startswith(_ZSTD) else -1
-        if size < 0:
+        try:
+            size = zstandard.frame_content_size(head) if head.startswith(_ZSTD) else None
+        except zstandard.ZstdError:
+            size = None
+        if size is None:
             raise InputError(
                 f'{self.path}: this is no file that rosbag2 has compressed; unpack it first'
             )
+        if size < 0:
+            # Whoever compresses while writing, as rosbags does, cannot say it beforehand.
+            size = _unpacked_size(packed)
+        if not size:
+            self.note(f'{self.path}: cut off or damaged before the first of it can be unpacked')
+            return
+        packed.seek(0)
         try:
             with zstandard.ZstdDecompressor().stream_reader(packed) as file:
                 yield from self._file(cast('BinaryIO', file), size, False)
@@ -203,6 +217,24 @@ class Scan:
 
 _BESIDE = frozenset((Opcode.ATTACHMENT, Opcode.METADATA))
 _PARSED = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
+
+
+def _unpacked_size(packed: BinaryIO) -> int:
+    """Return how many bytes a compressed file holds, up to where it is cut off or damaged.
+
+    A pass of its own, in memory that does not grow: without the size a cut could not be told.
+    """
+    import zstandard
+
+    packed.seek(0)
+    size = 0
+    try:
+        with zstandard.ZstdDecompressor().stream_reader(packed, closefd=False) as file:
+            while count := len(file.read(_PIECE)):
+                size += count
+    except zstandard.ZstdError:
+        pass  # `_file` says that it ends there
+    return size
 
 
 def _chunk_data(body: bytes, whole: bool) -> bytes:

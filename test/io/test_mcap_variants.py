@@ -128,6 +128,15 @@ def packed(data: bytes) -> bytes:
     return zstandard.ZstdCompressor().compress(data)
 
 
+def streamed(data: bytes) -> bytes:
+    """Return data as rosbags compresses files: how long they are is not said."""
+    out = BytesIO()
+    with zstandard.ZstdCompressor().stream_writer(out, closefd=False) as writer:
+        writer.write(data)
+    assert zstandard.frame_content_size(out.getvalue()) < 0
+    return out.getvalue()
+
+
 def test_messages_that_rosbag2_has_compressed(tmp_path: Path, bag: Path, record: Record) -> None:
     """Each message by itself (compression_mode: message); recover keeps them so."""
     path = rewritten(bag, tmp_path / 'a.mcap', packed)
@@ -148,15 +157,16 @@ def test_a_compressed_message_that_is_damaged_is_told(tmp_path: Path, bag: Path)
 
 
 @pytest.mark.parametrize('folder', [True, False])
-def test_files_that_rosbag2_has_compressed(
-    tmp_path: Path, bag: Path, record: Record, folder: bool
+@pytest.mark.parametrize('pack', [packed, streamed])
+def test_files_that_rosbag2_or_rosbags_has_compressed(
+    tmp_path: Path, bag: Path, record: Record, folder: bool, pack: Callable[[bytes], bytes]
 ) -> None:
     """Each file as a whole (compression_mode: file), in a bag or alone."""
     copy = tmp_path / 'copy'
     shutil.copytree(bag, copy)
     (plain,) = copy.glob('*.mcap')
     small = plain.with_name(f'{plain.name}.zstd')
-    small.write_bytes(packed(plain.read_bytes()))
+    small.write_bytes(pack(plain.read_bytes()))
     plain.unlink()
     content = (copy / 'metadata.yaml').read_text().replace(plain.name, small.name)
     (copy / 'metadata.yaml').write_text(content)
@@ -166,16 +176,20 @@ def test_files_that_rosbag2_has_compressed(
         recover(path)
 
 
-def test_a_compressed_file_that_is_cut_is_told(tmp_path: Path, bag: Path) -> None:
-    """What is whole in it can be read on request; without its size it is refused."""
+@pytest.mark.parametrize('pack', [packed, streamed])
+def test_a_compressed_file_that_is_cut_or_damaged_is_told(
+    tmp_path: Path, bag: Path, pack: Callable[[bytes], bytes]
+) -> None:
+    """What is whole in it can be read on request; what is no such file is refused."""
     (plain,) = bag.glob('*.mcap')
     path = tmp_path / 'a.mcap.zstd'
-    path.write_bytes(packed(plain.read_bytes())[:-200])
-    with pytest.raises(InputError, match='cut off'):
-        load(path)
-    out = BytesIO()
-    with zstandard.ZstdCompressor().stream_writer(out, closefd=False) as writer:
-        writer.write(plain.read_bytes())
-    path.write_bytes(out.getvalue())
-    with pytest.raises(InputError, match='unpack it first'):
-        load(path)
+    small = pack(plain.read_bytes())
+    for poor in (small[:-200], small[:-200] + bytes(200), small[: len(small) // 2]):
+        path.write_bytes(poor)
+        with pytest.raises(InputError, match='cut off'):
+            load(path)
+        assert summarise(path).damage
+    for other in (plain.read_bytes(), b'', small[:5]):
+        path.write_bytes(other)
+        with pytest.raises(InputError, match=r'unpack it first|cut off'):
+            load(path)
