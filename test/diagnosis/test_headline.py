@@ -200,6 +200,18 @@ def test_the_headline_follows_the_held_out_part(
     assert len(content['searched']) == sum(e.searched for e in CATALOGUE.values())
 
 
+def test_records_of_one_name_are_told_apart() -> None:
+    """In the one line that everybody reads."""
+    effect = replace(finding('backlash'), records=('w/b/t.csv',))
+    found = diagnosis('missing-effect', 40e-6, 10e-6, effect)
+    alone = replace(found, remaining={**found.remaining, 'records': [{'source': 'w/b/t.csv'}]})
+    assert 'backlash in t.csv only' in headline(alone)
+    both = [{'source': 'w/a/t.csv'}, {'source': 'w/b/t.csv'}]
+    assert 'backlash in b/t.csv only' in headline(
+        replace(found, remaining={**found.remaining, 'records': both})
+    )
+
+
 def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
     """A record that asks for a parameter which the fitting ones do not fix."""
     error = diagnosis('none', 13e-6, 13e-6).error

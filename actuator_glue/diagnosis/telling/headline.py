@@ -70,6 +70,8 @@ class Told(Protocol):
 
 def _called(found: Told, sources: Sequence[str]) -> dict[str, str]:
     """Return what people read as the names of some records, and of the others."""
+    if not sources:
+        return {}
     return source_names([*sources, *(r['source'] for r in found.remaining['records'])])
 
 
