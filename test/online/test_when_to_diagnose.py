@@ -391,10 +391,20 @@ def test_an_offset_is_told_and_not_carried():
     assert carried[0].known.carried.names == (*NAMES, 'backlash') and carried[0].weight == 0.97
 
     found.structure, found.effects = ('bias',), (offset,)
-    found.verdict, found.learned = 'missing-effect', ()
+    found.verdict, found.learned, found.doubts = 'missing-effect', (), ()
     found.error = SimpleNamespace(removed_ci=(0.9, 1.0))
     told = concluded(found, [record])
     assert told.proposal is None and not told.left_open and 'level' in told.why_not
+
+    # In doubt it is looked at again, and a model that is enough takes nothing back.
+    found.doubts = ('no posterior was reached',)
+    assert concluded(found, [record]).left_open
+    found.verdict, found.structure, found.effects = 'none', (), ()
+    told = concluded(found, [record])
+    assert told.proposal is None and told.left_open
+    found.doubts = ()
+    told = concluded(found, [record])
+    assert told.proposal is not None and not told.left_open
 
 
 def test_forecasts_that_are_far_off_where_few_samples_are_break_the_band():
