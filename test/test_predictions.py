@@ -248,7 +248,8 @@ def test_samples_need_a_rate_that_can_be(posterior: ag.Calibration, rate: Any) -
 @pytest.mark.parametrize('path', [None, 7, b'a.npz', ['a.npz']])
 def test_files_need_a_name(posterior: ag.Calibration, path: Any) -> None:
     """What is no path is refused as such, and says what to give."""
-    for use in (posterior.save, posterior.save_mat, ag.Calibration.load, ag.effects.load_effects):
+    loads = ag.Calibration.load, ag.effects.load_effects
+    for use in (posterior.save, posterior.save_mat, posterior.report, *loads):
         with pytest.raises(
             ag.InputError, match=r"path is .*; give the name of a file, as 'monday"
         ):

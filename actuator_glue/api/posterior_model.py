@@ -21,6 +21,7 @@ from actuator_glue.api.matlab import Exported, under, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
 from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as given_path
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.motion import speaking
 from actuator_glue.records import Hold, check_stiffness, source_name
@@ -186,7 +187,7 @@ class PosteriorModel(Result):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(Path(path), self.page(partition, next_command))
+            return html.write(given_path(path), self.page(partition, next_command))
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""
