@@ -128,7 +128,7 @@ def _diagnosed(
 
 def _told(found: Diagnosis) -> Row:
     row: Row = {
-        'verdict': found.verdict,
+        'verdict': found.outcome,
         'headline': found.summary(),
         'effects': BETWEEN.join(e.name for e in found.effects),
         'alternatives': BETWEEN.join(', '.join(e.alternatives) or '-' for e in found.effects),

@@ -97,15 +97,16 @@ class Scan:
             raise InputError(
                 f'{self.path}: this is no file that rosbag2 has compressed; unpack it first'
             )
-        if size < 0:
-            # Whoever compresses while writing, as rosbags does, cannot say it beforehand.
-            size = _unpacked_size(packed)
+        # A frame says its own size, if any: whoever compresses while writing cannot, and there may
+        # be several frames.
+        size = _unpacked_size(packed)
         if not size:
             self.note(f'{self.path}: cut off or damaged before the first of it can be unpacked')
             return
         packed.seek(0)
         try:
-            with zstandard.ZstdDecompressor().stream_reader(packed) as file:
+            unpacker = zstandard.ZstdDecompressor()
+            with unpacker.stream_reader(packed, read_across_frames=True) as file:
                 yield from self._file(cast('BinaryIO', file), size, False)
         except zstandard.ZstdError as error:
             self.note(f'{self.path}: cut off or damaged ({error}); what comes behind is lost')
@@ -229,7 +230,8 @@ def _unpacked_size(packed: BinaryIO) -> int:
     packed.seek(0)
     size = 0
     try:
-        with zstandard.ZstdDecompressor().stream_reader(packed, closefd=False) as file:
+        unpacker = zstandard.ZstdDecompressor()
+        with unpacker.stream_reader(packed, closefd=False, read_across_frames=True) as file:
             while count := len(file.read(_PIECE)):
                 size += count
     except zstandard.ZstdError:

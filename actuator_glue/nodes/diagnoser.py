@@ -132,12 +132,12 @@ class DiagnoserNode(WorkingNode):
         self._setups.settle()
         self._estimators.settle()
         block = sample_block.from_message(message)
-        self.memory.began(block.stamp_ns)
         before = self.collector.received
         self._tell(self.collector.push(block))
         if self.collector.received < before:
             self.memory.forget()
             self._remembered = Remembered()
+        self.memory.began(block.stamp_ns)
         if self.collector.received != before:
             self._take(live.Received(self.collector.received))
 

@@ -205,7 +205,7 @@ def fields(outcome: Outcome) -> Fields:
         return {}
     error = found.error
     return {
-        'verdict': found.verdict,
+        'verdict': found.outcome,
         'summary': outcome.message,
         'reason': outcome.reason,
         'records': list(outcome.sources),

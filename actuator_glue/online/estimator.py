@@ -557,12 +557,18 @@ class Estimator:
         return None if done is None else replace(window, number=done[0])
 
     def _proposed(self, window: Window) -> Proposal | None:
-        """Return the proposal to carry from a window on; None where it is not new."""
+        """Return the proposal to carry from a window on; None where it is not new.
+
+        Of a schedule, those before it are begun with here: their windows failed, and are not in
+        the bag.
+        """
         if self.schedule is None:
             return self._pending
         due = [model for number, model in self.schedule.models if number <= window.number]
         if len(due) == self._applied:
             return None
+        for passed in due[self._applied : -1]:
+            self._begin(Proposal.of(passed))
         self._applied = len(due)
         return Proposal.of(due[-1])
 

@@ -42,7 +42,7 @@ class Published:
             long bag's bands do not fit into memory.
         until: number of sample blocks recorded before its last result; the next run has had none
             of them.
-        later: it is not the first run of the bag: samples before it were another's.
+        later: samples stand before it in the bag: another run's, or none's.
     """
 
     settings: EstimatorSettings | None = None
@@ -150,6 +150,9 @@ def published(messages: Iterable[tuple[str, Any]]) -> list[Published]:
         elif kind == 'EstimatorSetup':
             if _begins(message, now):
                 runs.append(now := Published(later=True))
+            if now.settings is None:
+                # The recorder may have started before the estimator.
+                now.later = now.later or blocks > 0
             now.settings = conversion.estimator_settings(message)
             now.carried = conversion.carried(message)
             now.models.append((int(message.window), conversion.proposal(message)))
@@ -166,9 +169,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> list[Published]:
         elif kind == 'PredictionBand' and message.scored:
             key = (int(message.window), int(message.index), str(message.kind))
             now.scored[key] = _brief(message)
-    found = [run for run in runs if run.posteriors] or runs[-1:]
-    found[0].later = False
-    return found
+    return [run for run in runs if run.posteriors] or runs[-1:]
 
 
 def _begins(setup: Any, now: Published) -> bool:

@@ -114,6 +114,9 @@ class SlidingWindows:
         if self._next is None:
             return ''
         if self.current is None:
+            if announced := self._setups.announced:
+                first = min(setup.index for setup in announced)
+                return f'samples arrive, but the test set-up holds from sample {first} on only'
             return 'samples arrive, but nothing on test_setup yet'
         if self.current.stiffness is None:
             return f'the specimen stiffness of {self.current.actuator!r} is not known'

@@ -1,6 +1,7 @@
 """replay of a bag in which the estimator began again: each run is repeated by itself."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,11 +11,13 @@ import pytest
 from test_replay import put
 
 from actuator_glue import replay as replayed
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io import messages
 from actuator_glue.io.bag_reader import messages as bag_messages
 from actuator_glue.io.bag_records import read_records
 from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.model.parameters import NAMES
 from actuator_glue.online import conversion
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import replay, stream
@@ -33,13 +36,20 @@ TOPICS = {
 Said = list[tuple[str, conversion.Head, conversion.Fields]]
 
 
-def said(record: Any, start: int, stop: int, settings: EstimatorSettings) -> tuple[Said, Said]:
-    """Return what an estimator that hears some of a record announces, and what it finds."""
+def said(
+    record: Any, start: int, stop: int, settings: EstimatorSettings, known: Carried | None = None
+) -> tuple[Said, Said]:
+    """Return what an estimator that hears some of a record announces, and what it finds.
+
+    It starts from what is `known`, if anything.
+    """
     model, part = choose_model(), record.slice(start, stop)
     begins = conversion.Head(part.start_ns, '')
-    announced = [('EstimatorSetup', begins, conversion.estimator_setup(settings, model, 0, 0))]
+    announced = [
+        ('EstimatorSetup', begins, conversion.estimator_setup(settings, model, 0, 0, known))
+    ]
     found: Said = []
-    for result in replay(stream(part), settings, model):
+    for result in replay(stream(part), settings, model, carried=known):
         if isinstance(result, WindowResult):
             found.append(('PosteriorMoments', *conversion.posterior(result, 0.1)))
             found.append(('PosteriorDraws', *conversion.draws(result)))
@@ -96,6 +106,21 @@ def test_each_run_is_repeated_and_compared_by_itself(run, recorded: Callable[...
     assert content['compared']['posteriors'] == len(named)
     assert 'the estimator began 2 times in this bag' in done.err
     assert '1:0' in done.err + done.out and '2:0' in done.err + done.out
+
+
+@pytest.mark.parametrize('silent', [True, False])
+def test_a_prior_drifts_from_where_its_own_run_began(
+    recorded: Callable[..., Path], short_bag: Path, silent: bool
+) -> None:
+    """Samples stand before it: of a run without a posterior, or of a recorder that came first."""
+    (record,) = read_records(short_bag)
+    spread = 0.05 * np.random.default_rng(1).standard_normal((400, 4))
+    known = Carried(NAMES, np.array([134.0, 1.1e9, 2.5e5, 0.5]) * np.exp(spread))
+    settings = replace(SETTINGS, prior='calibration', drift=50.0)
+    announced, found = said(record, 330, len(record), settings, known)
+    before = [(0, announced)] if silent else []
+    done = replayed(recorded(lambda runs: [*before, (330, announced), (2**62, found)]))
+    assert done.identical and len(done.windows) >= 2, done.compared
 
 
 def test_what_differs_is_named_with_its_run(run, recorded: Callable[..., Path]) -> None:

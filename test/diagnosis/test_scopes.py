@@ -11,7 +11,6 @@ import pytest
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.search.table import (
-    HOLD,
     LINEAR,
     Row,
     outweighs,
@@ -109,11 +108,11 @@ def test_what_remains_unexplained_is_no_other_scope() -> None:
 
     plain = row(left=np.hypot(10.0, 25.0), price=4.0), 25.0
     less = row(left=np.hypot(10.0, 24.0), price=4.0), 24.0
-    (linear,) = scoped([less[0]], LINEAR, HOLD)
+    (linear,) = scoped([less[0]], LINEAR, np.log(28.0))
     (late,) = scoped([less[0]], 'since 9.5 s of a', 5.0)
     assert not first((linear, 24.0), plain) and not first((late, 24.0), plain)
     assert first((row('delay', left=np.hypot(10.0, 24.0), price=8.0), 24.0), plain)
-    (whole,) = scoped([row('delay', left=10.0, price=8.0)], LINEAR, HOLD)
+    (whole,) = scoped([row('delay', left=10.0, price=8.0)], LINEAR, np.log(28.0))
     assert first((whole, 0.0), plain)
 
 

@@ -156,8 +156,14 @@ def test_a_compressed_message_that_is_damaged_is_told(tmp_path: Path, bag: Path)
         load(path)
 
 
+def in_two(data: bytes) -> bytes:
+    """Frames one after the other, each with its size: joined files, or one packed in parts."""
+    half = len(data) // 2
+    return packed(data[:half]) + packed(data[half:])
+
+
 @pytest.mark.parametrize('folder', [True, False])
-@pytest.mark.parametrize('pack', [packed, streamed])
+@pytest.mark.parametrize('pack', [packed, streamed, in_two])
 def test_files_that_rosbag2_or_rosbags_has_compressed(
     tmp_path: Path, bag: Path, record: Record, folder: bool, pack: Callable[[bytes], bytes]
 ) -> None:

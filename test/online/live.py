@@ -1,6 +1,7 @@
 """Estimators as nodes run them, and what their results have in common."""
 
 import pickle
+from dataclasses import replace
 
 from online_streams import SETTINGS
 
@@ -44,11 +45,14 @@ class Message:
 
 
 class Live:
-    """An estimator as the node drives it, some windows slow, dropped or stopped early."""
+    """An estimator as the node drives it, some windows slow, dropped, failed or stopped early.
 
-    def __init__(self, items, drop=(), stop=None, models=None):
+    Other structures are carried from the windows in `requests` on.
+    """
+
+    def __init__(self, items, drop=(), stop=None, models=None, fail=(), requests=None, **changes):
         self.results, self.events, self.done, self.models = [], [], {}, []
-        estimator = Estimator(SETTINGS, choose_model(), live=True)
+        estimator = Estimator(replace(SETTINGS, **changes), choose_model(), live=True)
         self.models.append((0, estimator.model))
         busy = 0
         for item in items:
@@ -62,10 +66,16 @@ class Live:
             if busy > 0:
                 continue
             self.events += estimator.drop(lambda _: True)
+            if estimator._waiting and (
+                wanted := (requests or {}).get(estimator._waiting[0].number)
+            ):
+                estimator.set_model(wanted)
             job = estimator.next_job()
             if job is None:
                 continue
             number = job.window.number
+            if job.proposal is not None:
+                self.models.append((number, job.proposal))
             if models and number >= models[0] and not job.model.effects:
                 estimator.running = None
                 estimator._waiting.insert(0, job.window)
@@ -75,6 +85,8 @@ class Live:
             asked = iter(range(10**9))
             expired = None if stop is None else (lambda asked=asked: next(asked) >= stop)
             result = run(pickle.loads(pickle.dumps(job)), expired)
+            if number in fail:
+                result = replace(result, failure='of this test', moments=None)
             self.events += estimator.finish(pickle.loads(pickle.dumps(result)))
             if number in drop:
                 busy = 25  # blocks pass by while a window is computed

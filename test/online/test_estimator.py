@@ -14,6 +14,7 @@ from actuator_glue.online.ahead import Ahead
 from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.replay_comparison import differences
 from actuator_glue.online.stream import Dropped, Failed, Preview
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
@@ -126,6 +127,21 @@ def test_a_change_of_model_is_repeated_to_the_bit():
     assert len(live.results[-1].moments.mean) == 5
     again = results(items, schedule=live.schedule())
     assert all(map(same, live.results, again)) and len(again) == len(live.results)
+
+
+def test_a_request_at_a_window_that_failed_is_repeated_to_the_bit():
+    """It began afresh, and what it forgot is forgotten in the replay, too."""
+    base = choose_model()
+    afresh = Proposal((Proposed(base),), afresh=True)
+    two = Proposal((Proposed(base, 0.9), Proposed(choose_model(('backlash',)), 0.1)))
+    items, sequential = list(stream(record(6.0), 10)), {'prior': 'sequential'}
+    live = Live(items, stop=40, fail=(3,), requests={3: afresh, 4: two}, **sequential)
+    assert [number for number, _ in live.models] == [0, 3, 4]
+    settings = replace(SETTINGS, **sequential)
+    again = results(items, settings=settings, schedule=live.schedule())
+    assert [r.window.number for r in again] == [r.window.number for r in live.results]
+    assert 3 not in [r.window.number for r in again] and len(again) > 5
+    assert all(map(same, live.results, again))
 
 
 def test_a_gap_restarts_the_window_and_forecasts_across_it_are_dropped():

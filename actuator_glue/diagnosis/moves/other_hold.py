@@ -73,7 +73,7 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
         row = table.row(trial.structure, trial.effects, again, first.scorer, cost)
         row = replace(row, left_out=math.hypot(row.left_out, line))
         if first.prepared.setup is None:
-            (row,) = table.scoped([row], table.LINEAR, table.HOLD)
+            (row,) = table.scoped([row], table.LINEAR, table.of_hold(refits))
         if table.outweighs(row, first.row, found.material, complete):
             return True
     return False

@@ -104,7 +104,7 @@ class Conclusion:
         """Return rows of this answer's data as rows of all records as they were given."""
         some = self.over_all_data(some)
         linear = self.prepared.setup is not None
-        return table.scoped(some, LINEAR, table.HOLD) if linear else some
+        return table.scoped(some, LINEAR, table.of_hold(self.beam.refits)) if linear else some
 
     def over_all_data(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of the data since the onset, if there is one, as rows of all data."""

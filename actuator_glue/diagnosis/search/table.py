@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from actuator_glue.diagnosis.refits.candidates import mean_effects
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.score.weights import counted, log_weights, price
@@ -23,7 +22,6 @@ from actuator_glue.records import Array
 
 LINEAR = 'command linear between samples'
 SINCE = 'since '
-HOLD = math.log(1 + len(mean_effects()))  # nats: another hold is one more candidate
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +99,11 @@ def row(
     parameters = {p.name: value for p, value in values}
     left_out = scorer.left_out_error(fit)
     return Row(effects, scope, parameters, units, fit.rms, left_out, cost)
+
+
+def of_hold(refits: Refits) -> float:
+    """Return the price of another hold [nats]: it is one more candidate."""
+    return math.log(1 + len(refits.names))
 
 
 def scoped(some: Iterable[Row], scope: str, cost: float) -> tuple[Row, ...]:

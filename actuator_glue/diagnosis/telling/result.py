@@ -180,6 +180,11 @@ class DiagnosisData:
         """Whether nothing material remains, in either part, and nothing speaks against that."""
         return self.verdict in COMPLETE and not self.doubts
 
+    @property
+    def outcome(self) -> Verdict:
+        """The verdict for whoever reads one word only: 'unexplained' where there are doubts."""
+        return 'unexplained' if self.doubts else self.verdict
+
     def summary(self) -> str:
         """Return the verdict in one line."""
         return headline(self)
