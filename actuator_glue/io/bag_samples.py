@@ -75,8 +75,16 @@ def setup(found: BagMessage, path: Path | str) -> BagSetup:
         raise InputError(f'{where}: {error}') from None
 
 
-def topics_of_actuator(bag: Path | str, summary: Summary, namespace: str | None) -> list[str]:
+def topics_of_actuator(
+    bag: Path | str, summary: Summary, namespace: str | None, option: str = '--namespace'
+) -> list[str]:
     """Return the topics of one actuator, that of a namespace or the only one.
+
+    Args:
+        bag: for messages.
+        summary: what it holds.
+        namespace: the one that is wanted; None for the only one.
+        option: by which a namespace is chosen, for messages.
 
     Raises:
         InputError: no samples there, or several actuators and no namespace.
@@ -93,7 +101,7 @@ def topics_of_actuator(bag: Path | str, summary: Summary, namespace: str | None)
     elif len(samples) > 1:
         raise InputError(
             f'{bag}: samples of {len(samples)} actuators ({", ".join(samples)}); choose one with '
-            '--namespace'
+            f'{option}'
         )
     else:
         wanted = spaces[0] if spaces else ''

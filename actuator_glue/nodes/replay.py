@@ -62,15 +62,9 @@ class ReplayNode(streamer.Streamer):
         """
         summary = summarise(self.path)
         space = self.parameters['namespace'] or None
-        samples = [name for name, topic in summary.topics.items() if topic.type == SAMPLE_BLOCK]
-        if space is None and len(samples) > 1:
-            raise InputError(
-                f'{self.path}: samples of {len(samples)} actuators ({", ".join(samples)}); choose '
-                'one with the parameter namespace'
-            )
-        if space is None and not samples:
+        if space is None and all(t.type != SAMPLE_BLOCK for t in summary.topics.values()):
             return None
-        return topics_of_actuator(self.path, summary, space)
+        return topics_of_actuator(self.path, summary, space, 'the parameter namespace')
 
     def stream(self) -> Iterator[Step]:
         """Yield the messages of the bag, set-ups before their samples, as they were recorded."""
