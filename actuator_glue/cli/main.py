@@ -99,6 +99,8 @@ def _run(argv: list[str], out: StandardStream) -> int:
             )
         claim_outputs(args)
         return int(args.run(args))
+    except SystemExit as leaving:  # of argparse, which has told its help or what is wrong
+        return int(leaving.code or 0)
     except InputError as error:
         return _fail(str(error), 2, debug)
     except KeyboardInterrupt:

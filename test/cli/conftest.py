@@ -40,13 +40,10 @@ class Done(NamedTuple):
 
 
 def run_command(*arguments: object) -> Done:
-    """Run a command; argparse's own exits count as exit codes."""
+    """Run a command."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            code = main([str(a) for a in arguments])
-        except SystemExit as leaving:
-            code = leaving.code if isinstance(leaving.code, int) else 1
+        code = main([str(a) for a in arguments])
     return Done(code, out.getvalue(), err.getvalue())
 
 

@@ -13,9 +13,8 @@ from actuator_glue.cli.main import build_parser, commands, main
 def test_help_ends_with_two_examples_that_parse(command: str) -> None:
     """Of this command, different ones, accepted by its own parser."""
     out = io.StringIO()
-    with contextlib.redirect_stdout(out), pytest.raises(SystemExit) as leaving:
-        main([command, '--help'])
-    assert leaving.value.code == 0
+    with contextlib.redirect_stdout(out):
+        assert main([command, '--help']) == 0
     *_, title, first, second = out.getvalue().rstrip().splitlines()
     assert title == 'Examples:'
     assert first != second

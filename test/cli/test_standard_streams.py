@@ -94,3 +94,14 @@ def test_a_closed_standard_error_puts_no_remark_into_json(short_bag: Path) -> No
     done = shell('"$@" 2>&-', 'info', short_bag, '--json', '-')
     assert done.returncode == 0
     assert json.loads(done.stdout)['schema'] == 'actuator_glue.info/1'
+
+
+@pytest.mark.parametrize('command', [(), ('calibrate',)])
+def test_help_that_cannot_be_written_is_told(command: tuple[str, ...]) -> None:
+    """As any other output."""
+    done = shell('"$@" >/dev/full', *command, '--help')
+    assert (done.returncode, done.stderr) == (
+        2,
+        'actuator-glue: standard output: No space left on device\n',
+    )
+    assert shell('"$@" | true; exit ${PIPESTATUS[0]}', *command, '--help').returncode == 0
