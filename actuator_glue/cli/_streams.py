@@ -30,10 +30,14 @@ class StandardStream:
         self._gone = False
 
     def write(self, text: str) -> int:
-        """Write a text, or drop it."""
+        """Write a text, or drop it; what its encoding does not have is escaped."""
         if not self._gone:
             try:
-                self._under.write(text)
+                try:
+                    self._under.write(text)
+                except UnicodeEncodeError as error:  # none of the text was written
+                    known = text.encode(error.encoding, 'backslashreplace')
+                    self._under.write(known.decode(error.encoding))
             except OSError as error:
                 self._give_up(error)
         return len(text)

@@ -105,3 +105,16 @@ def test_help_that_cannot_be_written_is_told(command: tuple[str, ...]) -> None:
         'actuator-glue: standard output: No space left on device\n',
     )
     assert shell('"$@" | true; exit ${PIPESTATUS[0]}', *command, '--help').returncode == 0
+
+
+def test_letters_that_a_stream_does_not_have_are_escaped(tmp_path: Path, short_bag: Path) -> None:
+    """In answers and in messages: they end no command."""
+    record = tmp_path / 'mä.csv'
+    assert main(['convert', str(short_bag), str(record)]) == 0
+    line = 'PYTHONIOENCODING=ascii:strict "$@"'
+    done = shell(line, 'info', record)
+    assert (done.returncode, done.stderr) == (0, '')
+    assert 'm\\xe4.csv' in done.stdout
+    done = shell(line, 'info', tmp_path / 'nö.csv')
+    assert done.returncode == 2
+    assert 'n\\xf6.csv' in done.stderr
