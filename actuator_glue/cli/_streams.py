@@ -16,17 +16,19 @@ class StandardStream:
     other fault, as a full disk, is kept for the end of the command. Files are written and the
     command's own exit code stands either way.
 
+    Args:
+        under: the stream; None where it is closed.
+        number: its file descriptor.
+
     Attributes:
         closed_before: the command was started without this stream, as with `>&-`.
         fault: why something could not be written; empty where nothing was in the way.
     """
 
-    def __init__(self, under: TextIO | None) -> None:
+    def __init__(self, under: TextIO | None, number: int) -> None:
         self.closed_before = under is None
         self.fault = ''
-        # Opened in place of a closed stream, it takes that one's number, which the next file of
-        # the command would have otherwise: what libraries print would land there.
-        self._under = os.fdopen(os.open(os.devnull, os.O_WRONLY), 'w') if under is None else under
+        self._under = _nowhere(number) if under is None else under
         self._gone = False
 
     def write(self, text: str) -> int:
@@ -55,9 +57,13 @@ class StandardStream:
                 self._give_up(error)
 
     def end(self) -> None:
-        """Hand on what was written; close what was opened in place of a closed stream."""
+        """Hand on what was written; close what was opened in place of a closed stream.
+
+        Whoever has kept it, as a handler of a log, may write on.
+        """
         self.flush()
         if self.closed_before:
+            self._gone = True
             self._under.close()
 
     def __getattr__(self, name: str) -> Any:
@@ -74,11 +80,33 @@ class StandardStream:
             os.close(null)
 
 
+def _nowhere(number: int) -> TextIO:
+    """Open what takes the place of a closed stream, under its number.
+
+    The next file of the command would have that otherwise, and what libraries print would land
+    there.
+    """
+    null = os.open(os.devnull, os.O_WRONLY)
+    if null != number and not _is_open(number):  # what is open there by now stays
+        os.dup2(null, number)
+        os.close(null)
+        null = number
+    return os.fdopen(null, 'w')
+
+
+def _is_open(number: int) -> bool:
+    try:
+        os.fstat(number)
+    except OSError:
+        return False
+    return True
+
+
 @contextmanager
 def standard_streams() -> Iterator[tuple[StandardStream, StandardStream]]:
     """Put a `StandardStream` around standard output and standard error; yield both."""
     before = sys.stdout, sys.stderr
-    out, err = StandardStream(before[0]), StandardStream(before[1])
+    out, err = StandardStream(before[0], 1), StandardStream(before[1], 2)
     sys.stdout, sys.stderr = cast(TextIO, out), cast(TextIO, err)
     try:
         yield out, err

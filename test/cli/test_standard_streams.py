@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from actuator_glue.cli import info
+from actuator_glue.cli._streams import StandardStream
 from actuator_glue.cli.main import main
 
 COMMAND = [sys.executable, '-m', 'actuator_glue.cli.main']
@@ -118,3 +119,29 @@ def test_letters_that_a_stream_does_not_have_are_escaped(tmp_path: Path, short_b
     done = shell(line, 'info', tmp_path / 'nö.csv')
     assert done.returncode == 2
     assert 'n\\xf6.csv' in done.stderr
+
+
+@pytest.mark.parametrize('closed', ['<&- >&-', '<&- 2>&-', '<&- >&- 2>&-'])
+def test_no_file_takes_the_number_of_a_closed_stream(tmp_path: Path, closed: str) -> None:
+    """Also where standard input is closed, whose number is lower: libraries print to 1 and 2."""
+    code = (
+        'import os, sys\n'
+        'from actuator_glue.cli._streams import standard_streams\n'
+        'with standard_streams():\n'
+        '    files = [open(f"{sys.argv[1]}/{i}", "w") for i in range(3)]\n'
+        '    for number in (1, 2):\n'
+        '        os.write(number, b"of a library")\n'
+    )
+    line = f'"$0" -c "$1" "$2" {closed}'
+    subprocess.run(['bash', '-c', line, sys.executable, code, tmp_path], check=True)
+    assert [path.read_text() for path in sorted(tmp_path.iterdir())] == ['', '', '']
+
+
+def test_who_keeps_a_stream_may_write_on() -> None:
+    """As a handler of a log does, or a thread: what it writes is dropped."""
+    stream = StandardStream(None, 1)
+    stream.write('before')
+    stream.end()
+    stream.write('after')
+    stream.flush()
+    assert stream.fault == ''
