@@ -130,9 +130,10 @@ def claim_outputs(args: argparse.Namespace) -> None:
     Folders that are not there will be made, see `make_room`; that they can be is looked at here.
 
     Raises:
-        InputError: as `claim`; two outputs of one name, or no folder can be made for one.
+        InputError: as `claim`; two outputs of one name, one that is a folder above another, or no
+            folder can be made for one.
     """
-    options: dict[Path, str] = {}
+    before: list[tuple[str, Output]] = []
     for name, value in vars(args).items():
         if not isinstance(value, Output):
             continue
@@ -145,11 +146,9 @@ def claim_outputs(args: argparse.Namespace) -> None:
             continue  # a stream or device takes what comes
         _check_room(out)
         option = f'--{name.replace("_", "-")}'
-        other = options.setdefault(out.resolve(), option)
-        if other != option and not isinstance(value, Folder):  # which holds files of many names
-            raise InputError(
-                f'{other} and {option} would both write {out}; give each a name of its own'
-            )
+        for other in before:
+            _check_apart(other, (option, value))
+        before.append((option, value))
 
 
 def make_room(out: Path | str) -> None:
@@ -165,6 +164,24 @@ def make_room(out: Path | str) -> None:
         raise InputError(
             f'{out}: its folder cannot be made ({error.strerror or error}); choose another one'
         ) from error
+
+
+def _check_apart(one: tuple[str, Output], other: tuple[str, Output]) -> None:
+    """Refuse two outputs, with their options, that cannot both be written."""
+    places = [Path(value).resolve() for _, value in (one, other)]
+    filled = [isinstance(value, Folder) for _, value in (one, other)]  # with files of many names
+    if places[0] == places[1] and not all(filled):
+        raise InputError(
+            f'{one[0]} and {other[0]} would both write {Path(other[1])}; give each a name of its '
+            'own'
+        )
+    for above, below in ((0, 1), (1, 0)):
+        if places[above] in places[below].parents and not filled[above]:
+            (outer, folder), (inner, file) = (one, other)[above], (one, other)[below]
+            raise InputError(
+                f'{inner} {file} would lie in {folder}, which {outer} writes; give each a place '
+                'of its own'
+            )
 
 
 def _check_room(out: Path) -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from actuator_glue.arguments import Input, Output
+from actuator_glue.arguments import Folder, Input, Output, claim_outputs
 from actuator_glue.cli.main import commands
+from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
 
 
@@ -201,6 +202,37 @@ def test_two_outputs_need_two_names(run, tests: Path) -> None:
         assert 'a name of its own' in done.message
     done = run('calibrate', 'nope.csv', '--json', '/dev/null', '--report', '/dev/null')
     assert 'nope.csv' in done.message
+
+
+@pytest.mark.parametrize(
+    ('line', 'said'),
+    [
+        ('--save n1/x.npz --json n1', '--save n1/x.npz would lie in n1, which --json writes'),
+        ('--json n1 --save link/n1/x/y.npz', '--save link/n1/x/y.npz would lie in n1, which'),
+        ('--json n1/x/y.json --report n1', '--json n1/x/y.json would lie in n1, which --report'),
+    ],
+)
+def test_no_output_is_the_folder_of_another(run, tests: Path, line: str, said: str) -> None:
+    """What took hours would be lost in the end."""
+    done = run('calibrate', 'bag', *line.split())
+    assert done.code == 2
+    assert said in done.message
+    assert not (tests / 'n1').exists()
+
+
+@pytest.mark.parametrize('folder_first', [True, False])
+def test_a_folder_that_is_filled_is_no_file(tests: Path, folder_first: bool) -> None:
+    """In whatever order they are given; files may lie in it, and two may fill one."""
+
+    def given(**outputs: Output) -> argparse.Namespace:
+        order = sorted(outputs, reverse=not folder_first)
+        return argparse.Namespace(**{name: outputs[name] for name in order}, force=False)
+
+    with pytest.raises(InputError, match=r'would both write .*new; give each a name of its own'):
+        claim_outputs(given(a=Folder('new'), b=Output('link/new')))
+    claim_outputs(given(a=Folder('new'), b=Output('new/x.json')))
+    claim_outputs(given(a=Folder('new'), b=Folder('new')))
+    claim_outputs(given(a=Folder('new'), b=Folder('new/er')))
 
 
 def test_only_json_goes_to_standard_output(run, tests: Path) -> None:
