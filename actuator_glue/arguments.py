@@ -11,6 +11,8 @@ from typing import Literal
 
 from actuator_glue.errors import InputError
 
+# What a campaign keeps in its folder of the kind that others write there as summaries.
+CAMPAIGN_FILES = ('campaign.json', 'progress.json')
 _SECONDS = {'s': 1.0, 'min': 60.0, 'h': 3600.0, 'd': 86400.0}
 
 
@@ -211,6 +213,8 @@ def _takes_place_of(path: Path | str, read: Path) -> bool:
         return not isinstance(path, Folder) and (out.is_file() or out.is_dir())
     if read.is_dir():
         # No record is called so, and summaries of a folder may lie in it.
-        summary = out.suffix in ('.json', '.html')
-        return out.is_file() and not summary and read.resolve() in out.parents
+        folder = read.resolve()
+        summary = out.suffix in ('.json', '.html') and out.parent == folder
+        own = out.name in CAMPAIGN_FILES
+        return out.is_file() and folder in out.parents and (own or not summary)
     return not isinstance(path, Folder) and out in read.resolve().parents

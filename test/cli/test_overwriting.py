@@ -9,6 +9,10 @@ from pathlib import Path
 import pytest
 
 from actuator_glue.arguments import Folder, Input, Output, claim_outputs
+from actuator_glue.campaigns.campaign import _write_provenance
+from actuator_glue.campaigns.progress_file import Progress, ProgressFile
+from actuator_glue.campaigns.recipe import Recipe
+from actuator_glue.campaigns.rows import RowFolder
 from actuator_glue.cli.main import commands
 from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
@@ -170,6 +174,27 @@ def test_no_output_takes_the_place_of_an_input(run, tests: Path, line: str, read
     read = read.replace('MCAP', mcap)
     assert f'this command reads {read}, and writing there would destroy it' in done.message
     assert content(tests) == before
+
+
+def test_summaries_of_a_folder_are_written_again(run, tests: Path) -> None:
+    """Those that lie in it; not what a campaign keeps there, its rows among it."""
+    folder = tests / 'camp'
+    rows = RowFolder(folder)
+    rows.write('31ab', {'group': 'x'})
+    _write_provenance(folder, Recipe(), 0, None, 'x')
+    with ProgressFile(folder, Progress('running', 0), lambda _: None):
+        pass
+    kept = sorted(p.relative_to(tests) for p in folder.rglob('*.json'))
+    assert len(kept) == 3
+    before = content(tests)
+    for path in kept:
+        done = run('history', 'camp', '--json', path, '--force')
+        assert done.code == 2
+        assert f'{path}: this command reads camp, and writing there would destroy' in done.message
+    assert content(tests) == before
+    (folder / 'history.json').write_text('{}')
+    done = run('history', 'camp', '--json', folder / 'history.json', '--force')
+    assert 'no results.parquet here' in done.message
 
 
 def test_numbered_outputs_spare_inputs_too(run, tests: Path) -> None:
