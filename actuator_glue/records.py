@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, TypeGuard, TypeVar, cast
@@ -31,6 +33,8 @@ SLOWEST_RATE = 5.0  # Hz
 FASTEST_RATE = 100e3  # Hz
 # Periods closer than this are one [1]: the last digits of a clock, or of a rate turned over.
 _ONE_PERIOD = 1e-4
+# Those at the end of a path, and which of its records a source is.
+_LAST_SLASHES = re.compile(r'/+( \(record \d+ of \d+\))?$')
 
 
 def same_period(one: float, other: float) -> bool:
@@ -197,24 +201,39 @@ def source_name(source: str) -> str:
 def source_names(sources: Iterable[str]) -> dict[str, str]:
     """Return the shortest name of each source that tells it from the others, as people read it.
 
-    That is its last name, with as many of its folders as another source of the same name needs.
+    That is its last name, with as many of its folders as another source of the same name needs;
+    of one path that is written in several ways, each as it was given.
     """
-    given = list(dict.fromkeys(sources))
-    parts = {source: source.partition(':/')[0].rstrip('/').split('/') for source in given}
+    of = {source: _source_parts(source) for source in sources}
+    written = Counter(of.values())
+    used: dict[int, Counter[str]] = {}
 
-    def name(source: str, folders: int) -> str:
-        path, mark, rest = source.partition(':/')
-        return f'{"/".join(parts[source][-1 - folders :])}{mark}{rest}' if path else source
+    def name(parts: tuple[str, ...], folders: int) -> str:
+        return '/'.join(parts[-2 - folders : -1]) + parts[-1]
+
+    def taken(called: str, folders: int) -> bool:
+        if folders not in used:
+            used[folders] = Counter(name(parts, folders) for parts in written)
+        return used[folders][called] > 1
 
     found: dict[str, str] = {}
-    for source in given:
+    for source, parts in of.items():
         folders = 0
-        while folders < len(parts[source]) - 1 and any(
-            name(other, folders) == name(source, folders) for other in given if other != source
-        ):
+        while folders < len(parts) - 2 and taken(name(parts, folders), folders):
             folders += 1
-        found[source] = name(source, folders)
+        found[source] = source if written[parts] > 1 else name(parts, folders)
     return found
+
+
+def _source_parts(source: str) -> tuple[str, ...]:
+    """Return folders and last name of a source, and last what stands behind its path."""
+    path, mark, rest = source.partition(':/')
+    path = _LAST_SLASHES.sub(r'\1', path)
+    if not path:
+        return '', source
+    first, *others = path.split('/')
+    parts = [first, *(part for part in others if part not in ('', '.'))]
+    return (*(parts[1:] if parts[0] == '.' and parts[1:] else parts), mark + rest)
 
 
 def check_period(period: float, source: str = '') -> float:

@@ -24,16 +24,24 @@ from actuator_glue.records import source_names
         (['t.csv', 'a/t.csv'], ['t.csv', 'a/t.csv']),
         (['/t.csv', '/a/t.csv'], ['/t.csv', 'a/t.csv']),
         (['a/bag:/x/samples', 'b/bag:/x/samples'], ['a/bag:/x/samples', 'b/bag:/x/samples']),
-        (['w/bag/ (record 1 of 2)', 'w/bag/ (record 2 of 2)'], None),
+        (
+            ['w/bag/ (record 1 of 2)', 'w/bag/ (record 2 of 2)'],
+            ['bag (record 1 of 2)', 'bag (record 2 of 2)'],
+        ),
+        (['bag', 'bag/'], ['bag', 'bag/']),
+        (['w/bag', 'w//bag', 'v/bag', 'v/x'], ['w/bag', 'w//bag', 'v/bag', 'x']),
+        (['day1//test', 'day2//test'], ['day1/test', 'day2/test']),
+        (['day1/./test', './test'], ['day1/test', 'test']),
+        (['w/bag/:/x', 'v/bag:/x'], ['w/bag:/x', 'v/bag:/x']),
         (['a/t.csv', 'a/t.csv'], ['t.csv', 't.csv']),
         (['', ''], ['', '']),
     ],
 )
-def test_names_are_as_short_as_they_can_be(sources: list[str], names: list[str] | None) -> None:
+def test_names_are_as_short_as_they_can_be(sources: list[str], names: list[str]) -> None:
     """Folders stand only where another record has the same name."""
     found = source_names(sources)
     assert len(set(found.values())) == len(set(sources))
-    assert names is None or [found[s] for s in sources] == names
+    assert [found[s] for s in sources] == names
 
 
 def test_a_calibration_tells_them_apart(
