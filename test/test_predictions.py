@@ -165,6 +165,14 @@ def test_a_bode_plot_shows_what_was_measured(posterior: ag.Calibration, tmp_path
     assert [a.get_title('left') for a in again.plot_bode().axes[:2]] == ['free', 'k = 250 kN/m']
 
 
+def test_a_bode_plot_tells_records_of_one_name_apart(posterior: ag.Calibration) -> None:
+    """By the shortest paths that do so, those of the other pictures."""
+    named = zip(posterior.records, ('w/day1/run.csv', 'w/day2/run.csv'), strict=True)
+    found = replace(posterior, records=tuple(replace(r, source=s) for r, s in named))
+    titles = [axes.get_title('left') for axes in found.plot_bode().axes[:2]]
+    assert titles == ['day1/run.csv: free', 'day2/run.csv: k = 250 kN/m']
+
+
 def test_a_mat_file_holds_draws_and_model(posterior: ag.Calibration, tmp_path: Path) -> None:
     """What MATLAB reads is the transfer function that python-control has, at every stiffness."""
     path = posterior.save_mat(tmp_path / 'posterior.mat')

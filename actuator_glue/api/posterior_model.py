@@ -24,7 +24,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.given import path as given_path
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.motion import speaking
-from actuator_glue.records import Hold, check_stiffness, source_name
+from actuator_glue.records import Hold, check_stiffness, source_names
 
 if TYPE_CHECKING:
     import control
@@ -125,9 +125,10 @@ class PosteriorModel(Result):
         shown: list[tuple[str, FrequencyResponse]] = []
         if stiffness is None:
             given = of.records if record is None else (one_record_given(record),)
+            called = source_names(test.source for test in (*of.records, *given))
             for test in given[:_SIDE_BY_SIDE]:
                 found = response.recorded_response(draws, of.names, of.structure, test)
-                shown.append((response.title(found, source_name(test.source)), found))
+                shown.append((response.title(found, called[test.source]), found))
         if not shown:
             known = of.stiffness if stiffness is None else (check_stiffness(stiffness),)
             for k in known[:_SIDE_BY_SIDE]:

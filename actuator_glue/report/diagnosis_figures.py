@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from actuator_glue.diagnosis.telling.headline import names_of
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.verdict.traces import Trace
-from actuator_glue.records import Array, source_names
+from actuator_glue.records import Array
 from actuator_glue.report import style
 from actuator_glue.report.quantity import said_in
 from actuator_glue.report.style import (
@@ -44,9 +47,8 @@ def _text(found: DiagnosisData, side: str) -> str:
     return side if moved(found) else 'Eq. (2), refitted'
 
 
-def _title(found: DiagnosisData, trace: Trace, width: float) -> str:
+def _title(called: Mapping[str, str], trace: Trace, width: float) -> str:
     tail = f': k = {trace.stiffness / 1e3:g} kN/m{", held out" if trace.held_out else ""}'
-    called = source_names(t.source for t in found.traces)
     return style.fit(called[trace.source], width, tail=tail)
 
 
@@ -86,7 +88,7 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
         left.plot(trace.time[part], residual, color=color, lw=0.7, label=_text(found, side))
     left.set_xlabel('time [s]')
     left.set_ylabel('measured less model [um]')
-    left.set_title(_title(found, trace, room - 0.7))
+    left.set_title(_title(names_of(found), trace, room - 0.7))
     bars = [
         (_text(found, side), getattr(error, side), getattr(error, f'{side}_ci'), color)
         for side, color in _sides(found)
@@ -116,13 +118,14 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
 @styled
 def residuals_in_time(found: DiagnosisData) -> Figure:
     """Residual of every record against time, before and after."""
+    called = names_of(found)
     figure = new_figure(1.6 * len(found.traces) + 0.8)
     grid = figure.subplots(len(found.traces), 1, squeeze=False)[:, 0]
     for axes, trace in zip(grid, found.traces, strict=True):
         for side, color in _sides(found):
             t, residual = _lines(trace, trace.time, trace.measured - getattr(trace, side))
             axes.plot(t, 1e6 * residual, color=color, lw=0.6, label=_text(found, side))
-        axes.set_title(_title(found, trace, style.WIDTH - 0.7))
+        axes.set_title(_title(called, trace, style.WIDTH - 0.7))
         axes.set_ylabel('residual [um]')
     grid[-1].set_xlabel('time [s]')
     _legend(figure, grid[0])
@@ -145,6 +148,7 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
     """Density of the residual of every record, before and after."""
     columns = min(len(found.traces), 2)
     rows = -(-len(found.traces) // columns)
+    called = names_of(found)
     figure = new_figure(2.1 * rows + 0.6)
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
     for unused in panels[len(found.traces) :]:
@@ -153,7 +157,7 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
         for side, color in _sides(found):
             f, density = _density(trace, trace.measured - getattr(trace, side))
             axes.loglog(f, 1e6 * density, color=color, lw=0.8, label=_text(found, side))
-        axes.set_title(_title(found, trace, style.WIDTH / columns - 0.5))
+        axes.set_title(_title(called, trace, style.WIDTH / columns - 0.5))
         axes.set_xlabel('frequency [Hz]')
         style.decades(axes.xaxis)
         style.decades(axes.yaxis)
@@ -192,6 +196,7 @@ def _smooth(trace: Trace, values: Array) -> Array:
 @styled
 def loops(found: DiagnosisData) -> Figure:
     """Residual against displacement (slow part) and against velocity, before and after."""
+    called = names_of(found)
     figure = new_figure(2.1 * len(found.traces) + 0.4)
     grid = figure.subplots(len(found.traces), 2, squeeze=False)
     for (left, right), trace in zip(grid, found.traces, strict=True):
@@ -209,7 +214,7 @@ def loops(found: DiagnosisData) -> Figure:
                 color=color,
                 label=_text(found, side),
             )
-        left.set_title(_title(found, trace, style.WIDTH - 0.7))
+        left.set_title(_title(called, trace, style.WIDTH - 0.7))
         left.set_xlabel('displacement [mm] (slow part)')
         left.set_ylabel('residual [um]')
         right.set_xlabel('velocity [mm/s]')

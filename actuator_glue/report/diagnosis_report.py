@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from actuator_glue.diagnosis.telling.headline import names_of
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.json_value import Json
 from actuator_glue.online.stream import structure_name
-from actuator_glue.records import source_names
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.diagnosis_summary import advice, closing, first_page
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
@@ -43,7 +43,7 @@ def _um(value: float) -> str:
 
 
 def _error(found: DiagnosisData) -> Section:
-    e, called = found.error, _called(found)
+    e, called = found.error, names_of(found)
     sides = (
         ('before: Eq. (2), refitted', e.before, e.before_ci, found.coverage[0]),
         (
@@ -200,7 +200,7 @@ def _structures(found: DiagnosisData) -> Table:
 
 
 def _residual(found: DiagnosisData) -> Section:
-    a, called = found.alarm, _called(found)
+    a, called = found.alarm, names_of(found)
     tests = [
         [text, plain(factor * a.tests[name])]
         for name, (text, factor) in _STATISTICS.items()
@@ -251,15 +251,8 @@ def _residual(found: DiagnosisData) -> Section:
     )
 
 
-def _called(found: DiagnosisData) -> dict[str, str]:
-    """Return what people read as the name of each record."""
-    sources = [t.source for t in found.traces]
-    sources += [source for source, _, _ in found.error.records]
-    return source_names([*sources, *(r['source'] for r in found.remaining['records'])])
-
-
 def _records(found: DiagnosisData) -> Section:
-    called = _called(found)
+    called = names_of(found)
     rows = [
         [
             called[t.source],

@@ -11,6 +11,7 @@ from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.finding import Finding, Rival
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
+from actuator_glue.diagnosis.scopes.onset import Onset
 from actuator_glue.diagnosis.telling.advice import contradicted, zeros
 from actuator_glue.diagnosis.telling.headline import headline
 from actuator_glue.diagnosis.telling.result import DiagnosisData
@@ -210,6 +211,10 @@ def test_records_of_one_name_are_told_apart() -> None:
     assert 'backlash in b/t.csv only' in headline(
         replace(found, remaining={**found.remaining, 'records': both})
     )
+    held_out = replace(alone, error=replace(alone.error, records=(('w/a/t.csv', 2e-6, 1e-6),)))
+    assert 'backlash in b/t.csv only' in headline(held_out)
+    onset = Onset('w/b/t.csv', 9.0, 8.0, 10.0, 0.0, ('backlash',))
+    assert 'since 9.0 s of b/t.csv' in headline(replace(held_out, onset=onset))
 
 
 def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
@@ -236,7 +241,7 @@ def test_a_record_with_a_zero_of_its_own_contradicts_nothing() -> None:
     records = (('a.csv', 20e-6, 13e-6), ('b.csv', 20e-6, 13e-6))
     error = replace(error, records=records, after_without_zero=12.5e-6, zeros=(10e-6, 13e-6))
     assert misses(error, 5e-6)
-    (said,) = zeros(error, 5e-6)
+    (said,) = zeros(error, 5e-6, {'a.csv': 'a.csv', 'b.csv': 'b.csv'})
     assert said.startswith('a.csv: 13.0 um are left, 10.0 um without')
     error = replace(error, after_without_zero=10.5e-6)
     assert not misses(error, 5e-6)

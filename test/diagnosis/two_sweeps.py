@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import chain, repeat
 
 import numpy as np
 
@@ -54,12 +55,13 @@ def selected_of(
     names: tuple[str, ...],
     tests: Iterable[tuple[float, Array, Array]],
     seed: int = 1,
+    sources: Iterable[str] = (),
 ) -> tuple[BeamSearch, Selection]:
     """What `names` say of stiffness, command and displacement of each test, noise added."""
     rng = np.random.default_rng(seed)
     records = [
-        Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k)
-        for k, u, y in tests
+        Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k, source=source)
+        for (k, u, y), source in zip(tests, chain(sources, repeat('')), strict=False)
     ]
     beam = BeamSearch(Refits(Data.whole(records), names), Thresholds(), lambda s, d: None)
     return beam, beam.run()

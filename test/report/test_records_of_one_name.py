@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,10 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
+from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
+from actuator_glue.diagnosis.scopes.onset import Appeared
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import source_names
 
@@ -75,8 +79,11 @@ def test_a_diagnosis_tells_them_apart() -> None:
         ag.Record(moved, moved, 0.01, stiffness=0.0, source=f'w/{folder}/t.csv')
         for folder in ('a', 'b')
     )
+    base: Any = None  # which no name needs
     scope = OneRecord(Structure(['backlash']), 'backlash', (other,), (one, other)).scope
     assert scope == 'backlash in b/t.csv only'
+    appeared = Appeared(Data.whole([one]), Moment(0, 3.0), base, (other,))
+    assert appeared.scope == 'since 3.0 s of a/t.csv'
     setup = WrongSetup(
         (one.source, other.source), (5.0, 0.0), ('zoh', 'zoh'), ('stiffness',), 1e-6, 1e-5, True
     )

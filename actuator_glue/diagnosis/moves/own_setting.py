@@ -84,7 +84,7 @@ def _with_setting(
         return (), None
     start, held = refits.trial(effects), result.prepared.held.records
     tried = [
-        _fitted(refits, start, name, _members(data, held, i))
+        _fitted(refits, start, name, _members(data, held, i), held)
         for name in SETTINGS
         if name not in effects
         for i in range(len(data.records))
@@ -108,9 +108,15 @@ def _row(refits: Refits, trial: Trial, rest: Structure, tried: int) -> Row:
     return row(trial.model, trial.effects, trial.fit, refits.scorer, cost, trial.model.scope)
 
 
-def _fitted(refits: Refits, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:
+def _fitted(
+    refits: Refits,
+    start: Trial,
+    name: str,
+    records: tuple[Record, ...],
+    held: tuple[Record, ...],
+) -> Trial:
     structure = refits.structure(*start.effects, name)
-    model = OneRecord(structure, name, records, refits.data.records)
+    model = OneRecord(structure, name, records, (*refits.data.records, *held))
     thetas = refits.screen(start, name)[1]
     found = fit(refits.data, model, thetas)
     assert refits.scorer is not None

@@ -89,7 +89,9 @@ def _since(
         bare = next((trial for trial, excess in enough if excess <= most), None)
         if bare is None:
             return None
-        later = replace(second, appeared=Appeared(first.data, moment, bare))
+        later = replace(
+            second, appeared=Appeared(first.data, moment, bare, first.prepared.held.records)
+        )
         later = replace(later, others=later.over_all_data(second.others))
         return later if later.outweighs(first) else None
 

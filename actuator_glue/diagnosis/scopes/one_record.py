@@ -20,7 +20,7 @@ class OneRecord:
         structure: with all effects, learned terms among them.
         own: the effect that acts in `records` only.
         records: these records.
-        among: all records, from which the names of these tell them.
+        among: all records, those held out as well, from which the names of these tell them.
     """
 
     def __init__(

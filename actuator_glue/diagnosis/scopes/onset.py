@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data, Mask
 from actuator_glue.model.linear import systems
 from actuator_glue.model.parameters import BASE
-from actuator_glue.records import Array, source_names
+from actuator_glue.records import Array, Record, source_names
 
 _STEP = 0.25  # s between the times tried where it grows
 _WITHIN = 1.92  # nats: what a 95 % interval of one parameter excludes (Wilks 1938)
@@ -78,17 +78,19 @@ class Appeared:
         data: all counted samples, before and since.
         moment: its approximate time.
         before: the structure that is enough before it.
+        held: held-out records, from which the name of its record tells that, too.
     """
 
     data: Data
     moment: Moment
     before: Trial
+    held: tuple[Record, ...] = ()
 
     @property
     def scope(self) -> str:
         """Scope of the effects found since then."""
         record = self.data.records[self.moment.record]
-        called = source_names(r.source for r in self.data.records)
+        called = source_names(r.source for r in (*self.data.records, *self.held))
         name = called[record.source] or f'record {self.moment.record + 1}'
         return f'since {self.moment.time:.1f} s of {name}'
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from actuator_glue.diagnosis.verdict.rules import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.records import source_names
 
 _TELLING = Thresholds().tie_nats
 
@@ -198,9 +197,14 @@ def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
     )
 
 
-def zeros(error: HeldOutError, material: float) -> tuple[str, ...]:
-    """Name the held-out records whose own zero (offset and drift) matters."""
-    called = source_names(source for source, _, _ in error.records)
+def zeros(error: HeldOutError, material: float, called: Mapping[str, str]) -> tuple[str, ...]:
+    """Name the held-out records whose own zero (offset and drift) matters.
+
+    Args:
+        error: of the held-out part.
+        material: rms error that matters [m].
+        called: what people read as the name of each record.
+    """
     return tuple(
         f'{called[source]}: {1e6 * after:.1f} um are left, {1e6 * left:.1f} um without the '
         'offset and the drift of its own zero, which no other record tells'

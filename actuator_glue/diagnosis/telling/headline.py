@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from actuator_glue.diagnosis.finding import Finding
@@ -14,6 +14,7 @@ from actuator_glue.diagnosis.thresholds import LIKELY
 from actuator_glue.diagnosis.verdict.detect import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.rules import excuse, likely, misses
+from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.diagnosis.verdicts import Verdict
 from actuator_glue.json_value import Json
 from actuator_glue.records import source_names
@@ -53,6 +54,11 @@ class Told(Protocol):
         ...
 
     @property
+    def traces(self) -> Sequence[Trace]:
+        """Curves of each record, fitted or held out."""
+        ...
+
+    @property
     def onset(self) -> Onset | None:
         """When the effects appeared; None if they were there from the beginning."""
         ...
@@ -68,11 +74,23 @@ class Told(Protocol):
         ...
 
 
-def _called(found: Told, sources: Sequence[str]) -> dict[str, str]:
-    """Return what people read as the names of some records, and of the others."""
-    if not sources:
-        return {}
-    return source_names([*sources, *(r['source'] for r in found.remaining['records'])])
+def record_names(traces: Sequence[Trace], others: Iterable[str] = ()) -> dict[str, str]:
+    """Return what people read as the names of records, from their curves and other sources.
+
+    A diagnosis has one set of them, for its sentences, tables and pictures: a record that is held
+    out is told from those that were fitted, too.
+    """
+    return source_names([*(t.source for t in traces), *others])
+
+
+def names_of(found: Told) -> dict[str, str]:
+    """Return what people read as the name of each record that a diagnosis was asked about."""
+    others = [source for source, _, _ in found.error.records]
+    others += [row['source'] for row in found.remaining.get('records', ())]
+    others += [source for effect in found.effects for source in effect.records]
+    if found.onset is not None:
+        others.append(found.onset.source)
+    return record_names(found.traces, others)
 
 
 def _named(effect: Finding, found: Told) -> str:
@@ -80,8 +98,10 @@ def _named(effect: Finding, found: Told) -> str:
     if equations:
         term = f'a learned term {effect.name} ({equations[0]})'
         return f'{effect.cause} in another shape, {term}' if effect.cause else term
-    called = _called(found, effect.records)
-    where = f' in {", ".join(called[r] for r in effect.records)} only' if effect.records else ''
+    where = ''
+    if effect.records:
+        name = names_of(found)
+        where = f' in {", ".join(name[r] for r in effect.records)} only'
     if not likely(effect):
         return (
             f'something that looks most like {effect.name} ({_share(effect.probability)}){where}'
@@ -142,7 +162,7 @@ def _verdict(found: Told) -> str:
     enough = 'the model is enough'
     if found.onset is not None:
         source = found.onset.source
-        when = f' since {found.onset.time:.1f} s of {_called(found, [source])[source]}'
+        when = f' since {found.onset.time:.1f} s of {names_of(found)[source]}'
         names += when if names else ''
         enough += f'{when}, where its parameters changed'
     change = f'held-out error {_errors(found, bool(names))}, {_noise(found)}'

@@ -11,6 +11,7 @@ from actuator_glue.diagnosis.posterior.answer_posterior import AnswerPosterior
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.search import table
 from actuator_glue.diagnosis.telling import advice, companion_notes, response
+from actuator_glue.diagnosis.telling.headline import record_names
 from actuator_glue.diagnosis.telling.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.telling.remaining import remaining
 from actuator_glue.diagnosis.telling.response import Response
@@ -59,6 +60,11 @@ def told(
     learned = learned_term.described(final, data, sizes)
     contradicted = advice.contradicted(both.error, found.material)
     still, left = _at_rest(drawn), remaining(data, both.decision)
+    shown = (
+        *traces(prepared.fit, False, both.curves),
+        *traces(prepared.held, True, both.curves),
+    )
+    held_out = [source for source, _, _ in both.error.records]
     return DiagnosisData(
         verdict=both.verdict,
         effects=both.effects,
@@ -74,7 +80,7 @@ def told(
             *(term.sentence() for term in learned),
             *advice.of(both.decision, left, found, result.generic, both.stretches, experiments),
             *contradicted,
-            *advice.zeros(both.error, found.material),
+            *advice.zeros(both.error, found.material, record_names(shown, held_out)),
             *_beside(drawn, final, bool(contradicted)),
             *advice.unidentified(data, sizes),
             *advice.unconverged(float(np.fmax(drawn.alone.rhat, drawn.with_companions.rhat))),
@@ -100,10 +106,7 @@ def told(
         rhat=drawn.alone.rhat,
         sampler=drawn.alone.to_json(),
         best=after.theta,
-        traces=(
-            *traces(prepared.fit, False, both.curves),
-            *traces(prepared.held, True, both.curves),
-        ),
+        traces=shown,
         history=result.history,
         surrogate=result.generic.to_json(),
         remaining=left,
