@@ -154,7 +154,8 @@ def test_channels_without_a_common_clock_are_refused(
     ('x', 'changed', 'words'),
     [
         ('One', {'X0': ('0.0', '0.1')}, 'X0 differs between channels'),
-        ('One', {'Delta_X': ('0.001', '0.001')}, 'Delta_X is 0.001, but X_Value goes up by 0.002'),
+        ('One', {'Delta_X': ('0.003', '0.003')}, 'Delta_X is 0.003, but X_Value goes up by 0.002'),
+        ('One', {'Delta_X': ('0.002', '0.001')}, 'Delta_X differs between channels'),
         ('Multi', {'Delta_X': ('0.004', '0.004')}, 'Delta_X is 0.004, but .* up by 0.002'),
         ('One', {'Samples': ('4000', '4000')}, 'Samples is 4000, and 2000 rows follow'),
     ],
@@ -166,6 +167,41 @@ def test_a_column_of_times_that_the_heading_contradicts_is_refused(
     with pytest.raises(InputError, match=words):
         read(labview(tmp_path / 'a.lvm', x=x, channels=changed))
     check(labview(tmp_path / 'b.lvm', x=x, channels={'Samples': ('100', '100')}))
+
+
+@pytest.mark.parametrize(
+    'changed',
+    [
+        {'Samples': ('1', '1'), 'Delta_X': ('1.000000', '1.000000')},
+        {'Samples': ('0', '0'), 'Delta_X': ('1.0', '1.0'), 'X0': ('0.0', '0.1')},
+        {'Samples': ('100', '100'), 'Delta_X': ('1.000000', '1.000000')},
+        {'Delta_X': ('0.0002', '0.0002')},
+        {'Delta_X': ('0.002', '0.0020')},
+        {'X0': ('0.0', '0.002')},
+    ],
+)
+def test_a_heading_that_says_less_than_the_column_of_times_is_no_contradiction(
+    tmp_path: Path, changed: dict
+) -> None:
+    """Single samples and appended rows, a step before decimation, starts a sample apart."""
+    check(labview(tmp_path / 'a.lvm', x='One', channels=changed))
+
+
+def test_a_step_of_few_digits_is_the_one_that_it_was_rounded_from(tmp_path: Path) -> None:
+    """A third of a millisecond may be 0.0003, and nothing else with one digit."""
+    path = labview(tmp_path / 'a.lvm', x='One', channels={'Delta_X': ('0.0003', '0.0003')})
+    top, names, rows = path.read_text('cp1252').partition('X_Value\tCommand\tMeasured\tComment\n')
+    table = [line.split('\t') for line in rows.splitlines() if line.strip()]
+    for step, good in ((1.0 / 3000.0, True), (0.0004, False)):
+        lines = ['\t'.join([f'{i * step:.9f}', *row[1:]]) for i, row in enumerate(table)]
+        path.write_text('\n'.join([top + names + lines[0], *lines[1:]]), 'cp1252')
+        if good:
+            assert read(path).period == pytest.approx(step, rel=1e-5)
+            continue
+        with pytest.raises(
+            InputError, match=r'Delta_X is 0\.0003, but .* up by 0\.0004'
+        ):
+            read(path)
 
 
 def segments(path: Path, x: str, starts: list[float], *, again: bool = False, **changed) -> Path:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuator_glue.clock_check import rate_by_clock
+from actuator_glue.clock_check import APART, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, delimited
@@ -178,23 +178,54 @@ def _check_clock(
 ) -> None:
     """Refuse a column of times that the heading contradicts.
 
+    A heading of single samples, or of the first rows of many in one X column, says nothing of
+    the step: LabVIEW writes a `Delta_X` of 1 there. Where samples were decimated it is that of
+    all, and the rows go up by a whole multiple of it.
+
     Raises:
         InputError: Delta_X is another step, or channels of one column begin at different times.
     """
-    for name in ('Delta_X', 'X0') if said.file.get('X_Columns', 'One').lower() == 'one' else ():
-        _common(path, segment, name, shown)
-    for text in set(_of_channels(segment, 'Delta_X', shown)) - {''}:
-        try:
-            step = float(text.replace(',', '.'))
-        except ValueError:
-            continue
+    one = said.file.get('X_Columns', 'One').lower() == 'one'
+    counts = [int(n) for n in _of_channels(segment, 'Samples', shown) if n.isdecimal()]
+    if counts and (max(counts) <= 1 or (one and segment.rows > max(counts))):
+        return
+    spacing = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    for name in ('Delta_X', 'X0') if one else ():
+        found = [value for _, value in _numbers(segment, name, shown)]
+        allowed = abs(spacing) if name == 'X0' else APART * max(found, default=0.0)
+        if max(found, default=0.0) - min(found, default=0.0) > allowed * (1.0 + 1e-6):
+            _common(path, segment, name, shown)
+    for text, step in set(_numbers(segment, 'Delta_X', shown)):
         # In units of steps: the comparison wants two seconds of any rate.
         rate = rate_by_clock(np.arange(len(times)), times / step, 1.0) if step > 0.0 else None
-        if rate is not None:
+        if rate is None:
+            continue
+        kept = round(1.0 / rate)  # of so many samples, one
+        decimated = kept > 1 and abs(1.0 / rate - kept) <= APART * kept
+        if not decimated and abs(step / rate - step) > _rounded(text):
             raise InputError(
                 f'{path}: Delta_X is {text}, but {_TIMES} goes up by {step / rate:.6g}; mend the '
                 'one that is wrong'
             )
+
+
+def _numbers(segment: _HeadedRows, name: str, shown: list[int]) -> list[tuple[str, float]]:
+    """Return the numbers that a heading says of channels, as they are written and as they are."""
+    found = []
+    for text in _of_channels(segment, name, shown):
+        try:
+            value = float(text.replace(',', '.'))
+        except ValueError:
+            continue
+        if np.isfinite(value):
+            found.append((text, value))
+    return found
+
+
+def _rounded(text: str) -> float:
+    """Return how far a number may be from the one that it was rounded from."""
+    digits, _, power = text.lower().replace(',', '.').partition('e')
+    return 0.5 * 10.0 ** (int(power or 0) - len(digits.partition('.')[2]))
 
 
 def _joined(path: Path, clocks: list[_SegmentTimes], scale: float) -> Array:
