@@ -124,21 +124,57 @@ def parts(path: Path, *behind: float, period: float = 1e-3) -> Path:
 
 
 def test_segments_of_tdms_that_go_on_are_one_record(tmp_path: Path) -> None:
-    """Each with its own start, or all with the first one: the record begins with the first."""
-    for second in (COUNT // 2, COUNT // 2 + 0.1, 0):
+    """Each with its own start, stamped somewhat late, or all with the first one."""
+    for second in (COUNT // 2, COUNT // 2 + 0.1, COUNT // 2 + 30, COUNT // 2 - 2, 0):
         record = read(parts(tmp_path / 'a.tdms', 0, second))
         assert record.start_ns == START_NS
         assert np.array_equal(record.command, 1e-3 * COMMAND)
 
 
 def test_segments_of_tdms_that_begin_anew_are_refused(tmp_path: Path) -> None:
-    """A minute or a sample later, or at another rate: no record is joined over that."""
+    """A minute or a moment later, or at another rate: no record is joined over that."""
     half = COUNT // 2
-    for second in (half + 60_000, half + 1, half - 1):
+    for second in (half + 60_000, half + 100, half - 100):
         with pytest.raises(InputError, match=f'command_mm begins anew at sample {half}, .*each'):
             read(parts(tmp_path / 'a.tdms', 0, second))
     with pytest.raises(InputError, match=f'every 0.002 s from sample {half} on'):
         read(parts(tmp_path / 'a.tdms', 0, half, period=2e-3))
+
+
+def stamped(path: Path, *starts: np.datetime64) -> Path:
+    """Write waveforms in segments of as many samples each, with these starts."""
+    ends = np.linspace(0, COUNT, len(starts) + 1).astype(int)
+    with TdmsWriter(path) as writer:
+        for begin, end, start in zip(ends[:-1], ends[1:], starts, strict=True):
+            own = waveform(start=start)
+            writer.write_segment(
+                [
+                    ChannelObject('run', 'command_mm', COMMAND[begin:end], own),
+                    ChannelObject('run', 'measured_mm', MEASURED[begin:end], own),
+                ]
+            )
+    return path
+
+
+def test_stamps_of_segments_of_tdms_may_jitter_and_not_add_up(tmp_path: Path) -> None:
+    """A clock that is milliseconds late each time goes on; samples missing each time do not."""
+    every = COUNT // 8
+    jitter = [0.0, 2.4, 1.1, 0.3, 1.9, 0.0, 2.2, 0.7]
+    path = stamped(tmp_path / 'a.tdms', *[later(i * every + j) for i, j in enumerate(jitter)])
+    assert np.array_equal(read(path).command, 1e-3 * COMMAND)
+    stamped(path, *[later(i * (every + 20)) for i in range(8)])
+    with pytest.raises(InputError, match=rf'begins anew at sample {3 * every}, 0\.06 s after'):
+        read(path)
+
+
+def test_no_start_of_segments_of_tdms_is_none(tmp_path: Path) -> None:
+    """LabVIEW's time zero in some segments: the record begins as those with a start say."""
+    zero = np.datetime64('1904-01-01T00:00:00', 'us')
+    half = later(COUNT // 2)
+    for starts in ((zero, half), (later(0.0), zero), (zero, zero)):
+        record = read(stamped(tmp_path / 'a.tdms', *starts))
+        assert record.start_ns == (0 if starts == (zero, zero) else START_NS)
+        assert np.array_equal(record.command, 1e-3 * COMMAND)
 
 
 def test_times_of_tdms_that_its_waveforms_contradict_are_refused(tmp_path: Path) -> None:

@@ -198,9 +198,7 @@ def test_a_step_of_few_digits_is_the_one_that_it_was_rounded_from(tmp_path: Path
         if good:
             assert read(path).period == pytest.approx(step, rel=1e-5)
             continue
-        with pytest.raises(
-            InputError, match=r'Delta_X is 0\.0003, but .* up by 0\.0004'
-        ):
+        with pytest.raises(InputError, match=r'Delta_X is 0\.0003, but .* up by 0\.0004'):
             read(path)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,13 @@ from actuator_glue.records import Array, same_period
 _NAME = 'a LabVIEW TDMS file'
 # Starts that differ by whole samples, up to this share of a sample, are of one clock.
 _SAME = 0.02
-# A waveform goes on where a later segment begins this near its next sample [1]: computers and
-# converters count seconds of their own, and a lost sample is a whole one.
-_GOES_ON = 0.25
+# A waveform goes on where a later segment begins this near its next sample: the computer stamps a
+# segment when it has it, by a clock of ticks of 15.6 ms, and late by what else it does: two ticks
+# and some milliseconds [s], or a sample late one time and early another [1]. Shorter gaps cannot
+# be told from that, but those of many segments add up, which stamps do not.
+_STAMPED, _STAMPED_SAMPLES = 0.04, 2.0
+# Computers and converters count seconds of their own, this far apart at most [1].
+_DRIFT = 5e-4
 _WAVE = ('wf_start_time', 'wf_start_offset', 'wf_increment')
 # LabVIEW's time zero: the start of a waveform that was given none.
 _UNKNOWN = np.datetime64('1904-01-01T00:00:00', 'us')
@@ -126,7 +130,10 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
     first = previous = last
     at = 0  # values before what was said last
     now: dict[str, Any] = {}
-    for before, own in said:
+    for before, said_here in said:
+        own = dict(said_here)
+        if 'wf_start_time' in now and _start_ns(own) is None:
+            own.pop('wf_start_time', None)
         known, now = now, {**now, **own}
         clock = _of_properties(last.name, now, last.length)
         # What is said behind all samples, when a file is closed, is of all of them.
@@ -140,11 +147,21 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
                 f'{last.name} has a sample every {previous.period:.9g} s, and every '
                 f'{clock.period:.9g} s from sample {before} on'
             )
-        if (previous.start_ns is None) != (clock.start_ns is None):
-            return first, f'{last.name} has a start of its own from sample {before} on'
-        passed = ((clock.start_ns or 0) - (previous.start_ns or 0)) * 1e-9
-        late = passed + clock.offset - previous.offset - (before - at) * clock.period
-        if abs(late) > _GOES_ON * clock.period:
+        if previous.start_ns is None and clock.start_ns is not None:
+            # The first samples came before the first start that anybody says.
+            ahead = before * clock.period + first.offset - clock.offset
+            first = replace(first, start_ns=clock.start_ns - round(ahead * 1e9))
+            previous, at = clock, before
+            continue
+        allowed = max(_STAMPED, _STAMPED_SAMPLES * clock.period)
+        passed = (before - at) * clock.period, before * clock.period
+        faults = [
+            late
+            for since, time in zip((previous, first), passed, strict=True)
+            if abs(late := _ahead(since, clock) - time) > allowed + _DRIFT * time
+        ]
+        if faults:
+            late = max(faults, key=abs)
             how = 'after' if late > 0.0 else 'before'
             return first, (
                 f'{last.name} begins anew at sample {before}, {abs(late):.6g} s {how} the samples '
@@ -154,6 +171,12 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
     return first, ''
 
 
+def _ahead(one: _Clock, other: _Clock) -> float:
+    """Return how long after the first sample of a waveform that of another one was taken [s]."""
+    passed = ((other.start_ns or 0) - (one.start_ns or 0)) * 1e-9
+    return passed + other.offset - one.offset
+
+
 def _clock(channel: Any) -> _Clock:
     """Return the times of a channel, as LabVIEW's waveforms have them."""
     return _of_properties(channel.name, channel.properties, len(channel))
@@ -161,19 +184,24 @@ def _clock(channel: Any) -> _Clock:
 
 def _of_properties(name: str, properties: Mapping[str, Any], length: int) -> _Clock:
     period = float(properties.get('wf_increment', 0.0))
-    start: Any = properties.get('wf_start_time')
-    if hasattr(start, 'as_datetime64'):
-        start = start.as_datetime64('us')
-    known = isinstance(start, np.datetime64) and start != _UNKNOWN and not np.isnat(start)
     return _Clock(
         name,
         period if period > 0.0 else 0.0,
         float(
             np.nan_to_num(float(properties.get('wf_start_offset', 0.0)), posinf=0.0, neginf=0.0)
         ),
-        int(start.astype('datetime64[ns]').astype(np.int64)) if known else None,
+        _start_ns(properties),
         length,
     )
+
+
+def _start_ns(properties: Mapping[str, Any]) -> int | None:
+    """Return the start of a waveform [ns]; None where none is said, or LabVIEW's time zero."""
+    start: Any = properties.get('wf_start_time')
+    if hasattr(start, 'as_datetime64'):
+        start = start.as_datetime64('us')
+    known = isinstance(start, np.datetime64) and start != _UNKNOWN and not np.isnat(start)
+    return int(start.astype('datetime64[ns]').astype(np.int64)) if known else None
 
 
 def _one_clock(one: _Clock, other: _Clock) -> bool:
