@@ -22,6 +22,18 @@ _MEANT = {
     ),
     'hold': re.compile(r'(?:command_)?hold(?:_type|_mode|_order|_of_(?:the_)?command)?'),
 }
+# Values that state one of these; other words behind a colon are prose.
+_STATED = {
+    'stiffness_N_per_m': re.compile(
+        r'[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?'
+        r'(?:\s*|\s*[\[(]?(?:[kmg]?n|lbf?|kips?|kgf)\s*(?:/|\bper\b)\s*'
+        r'(?:[cmµμu]?m|in|inch|ft)\b.*)'
+    ),
+    'hold': re.compile(
+        r'(?:zoh|foh|linear\w*|(?:zero|first)[\s_-]*order|straight|step(?:s|wise)?|held|ramp\w*'
+        r'|interpolat\w*)\b.*|zero|first'
+    ),
+}
 _TYPED = 0.85  # as alike as words are where a letter of a long one is missing or exchanged
 
 
@@ -35,11 +47,20 @@ def nearly(name: str) -> bool:
     return note_of(name) is not None or _meant(name) is not None
 
 
+def states(name: str, value: str) -> bool:
+    """Return whether a name with its value behind a colon is a note, right or nearly, no prose."""
+    meant = _meant(name)
+    if note_of(name) is not None or meant is None:
+        return note_of(name) is not None
+    return _STATED[meant].fullmatch(value.strip().casefold()) is not None
+
+
 def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     """Return what a file says besides, by the names of `NOTES`; other notes are left out.
 
     Args:
-        notes: all that the file says, by the names that it uses.
+        notes: all that the file says, by the names that it uses; those that are not in `NOTES`
+            with the colon behind them where the file has one.
         where: file, for messages.
 
     Raises:
@@ -47,10 +68,11 @@ def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for name, value in notes.items():
-        known, meant = note_of(name), _meant(name)
+        known, meant = note_of(name), _meant(name.removesuffix(':'))
+        sign = '' if name.endswith(':') else ' ='
         if known is None and meant is not None:
             raise InputError(
-                f'{where}: the note {f"{name} = {value}"!r} is not understood; write '
+                f'{where}: the note {f"{name}{sign} {value}"!r} is not understood; write '
                 f'`{meant} = VALUE`, which is {NOTES[meant]}, or take it out'
             )
         if known is not None:

@@ -35,6 +35,9 @@ def test_capitals_and_colons_are_read(tmp_path: Path, sign: str) -> None:
     [
         ('stiffness = 250e3', '`stiffness_N_per_m = VALUE`, which is the specimen stiffness'),
         ('stiffness: 250e3', 'stiffness_N_per_m'),
+        ('Stiffness: 250 N/mm, steel', 'stiffness_N_per_m'),
+        ('specimen stiffness: 1.4 kips/in', 'stiffness_N_per_m'),
+        ('hold mode: ramp', '`hold = VALUE`'),
         ('Stiffness [kN/m]: 250', 'stiffness_N_per_m'),
         ('hold type: linear', '`hold = VALUE`'),
         ('command hold: zero order', '`hold = VALUE`'),
@@ -50,6 +53,28 @@ def test_notes_nearly_right_are_refused(tmp_path: Path, note: str, said: str) ->
     with pytest.raises(InputError, match=r'a\.csv: the note .* is not understood; write') as found:
         read(text(tmp_path / 'a.csv', f'# {note}'))
     assert said in str(found.value)
+    assert f"the note '{note}' is" in str(found.value)
+
+
+@pytest.mark.parametrize(
+    'prose',
+    [
+        'Stiffness: none',
+        'Specimen stiffness: none',
+        'Stiffness: linear',
+        'Stiffness: held constant',
+        'stiffness: zero',
+        'stiffness: 12 mm plate',
+        'Stiffness: 3 springs in parallel',
+        'Command hold: first second',
+        'hold type: 1',
+        'hold mode: none',
+    ],
+)
+def test_prose_behind_a_colon_is_no_note(tmp_path: Path, prose: str) -> None:
+    """What states no stiffness and no hold, whatever its words are elsewhere."""
+    record = read(text(tmp_path / 'a.csv', f'# {prose}'))
+    assert (record.hold, record.stiffness) == ('zoh', None)
 
 
 def test_notes_said_twice_are_refused(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import add_note, nearly, note_of
+from actuator_glue.io.file_notes import add_note, note_of, states
 from actuator_glue.io.formats import Column, FileTable, Format
 from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import EXAMPLE, bare, units_line
@@ -49,8 +49,6 @@ _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
 # What begins a comment: `#` as numpy writes it, `%` as MATLAB does.
 _COMMENT = re.compile(r'\s*(?:#[#\s]*|%+\s+)')
-# What the value of a note begins with: a number, or how a command is held.
-_VALUE = re.compile(r'\s*(?:[+-]?\.?\d|zoh|foh|lin|zero|first|straight|step|held|none)', re.I)
 # Names of columns that go up by themselves: a running number below one may be its values.
 _GOES_UP = re.compile(
     r'time|zeit|sample|index|count|number|row|step|^(nr|no|id|t|i|n|#)\b', re.IGNORECASE
@@ -164,9 +162,8 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
         name, sign, value = comment.partition('=')
         before, colon, behind = comment.partition(':')
         # One nearly right is refused as with `=`; `Stiffness: see drawing` is prose.
-        prose = note_of(before) is None and _VALUE.match(behind) is None
-        if colon and nearly(before) and not prose:
-            name, sign, value = before, colon, behind
+        if colon and states(before, behind):
+            name, sign, value = before if note_of(before) else f'{before.strip()}:', colon, behind
         if sign:
             add_note(notes, name.strip(), value.strip(), str(path))
         else:
