@@ -1,7 +1,8 @@
 """Ground motions from files: PEER's AT2, and delimited text.
 
 The unit of an acceleration is part of what the file says: in the name of its column, in a line of
-units below the names, or as `units of g`. What is said and not understood is refused.
+units below the names, or as `units of g`. A unit that is said and not understood is refused; words
+that are no unit say none.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.hybrid.ground_motion import GroundMotion, artificial
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.signature import text_encoding
-from actuator_glue.io.units import ROLES
+from actuator_glue.io.units import ROLES, is_unit, symbol
 from actuator_glue.records import Array
 
 GRAVITY = 9.80665  # m/s^2
@@ -33,7 +34,7 @@ _UNITS = {
 }
 for _unit, _length in {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'in': 0.0254, 'ft': 0.3048}.items():
     _UNITS |= dict.fromkeys((f'{_unit}/s2', f'{_unit}/s/s', f'{_unit}s-2'), _length)
-    _UNITS[f'{_unit}ps2'] = _length
+    _UNITS |= dict.fromkeys((f'{_unit}ps2', f'{_unit}s2'), _length)
 _LISTED = 'g, gal, m/s^2, cm/s^2, mm/s^2, in/s^2 or ft/s^2'
 _MEND = f'name the columns `time_s,acceleration_UNIT` with {_LISTED}'
 _TIME = re.compile(r'(?:time|zeit|temps|tiempo|t|sec(?:ond)?s?|s)(?![a-z])', re.IGNORECASE)
@@ -43,10 +44,16 @@ _OTHER = re.compile(
 )
 _ACCELERATION = re.compile(r'(?<![a-z])(?:acc|beschl)', re.IGNORECASE)
 _BRACKETS = re.compile(r'[\[({]\s*([^\[\](){}]*?)\s*[\])}]')
-# `units of g`, `Units: cm/s2`; a unit ends at a comma, a bracket or the end of a sentence.
-_SAID = re.compile(
-    r'\bunits?(?:\s+of\s+|\s*[:=]\s*)(?:acceleration\s*[:=]?\s*)?([^,;()\s]+)', re.IGNORECASE
+# `units of g`, `Units: s, cm/s2`: what is behind it in its line.
+_SAID = re.compile(r'\bunits?(?:\s+of\s+|\s*[:=]\s*)(.+)', re.IGNORECASE)
+# `acceleration in g`, but not the largest one.
+_IN_PROSE = re.compile(r'(?<!peak )(?<!max )(?<!max\. )\baccel\w*\.?\s+in\s+([^\s,;()]+)', re.I)
+_LAST = re.compile(r',\s*([^\s,;()]+)\s*$', re.MULTILINE)  # `Record of El Centro, g`
+_ABOUT = re.compile(r'time|acc\w*|and|in|of|is|are', re.IGNORECASE)  # words among units
+_NOT_SECONDS = re.compile(
+    r'min(?:utes?)?|h|hrs?|hours?|d|days?|samples?|steps?|ticks?|frames?|h+:m+.*', re.IGNORECASE
 )
+_VELOCITIES = frozenset(('kine', 'mph', 'kph', 'mps', 'cmps', 'mmps', 'ips', 'fps'))
 # Which of several directions a column is, behind its `_`: no unit.
 _DIRECTION = re.compile(
     r'[xyznsewuhvl]|ns|ew|ud|up|vert(ical)?|hor(izontal)?|[hxyz]\d|\d+|ground|base|input',
@@ -103,7 +110,32 @@ def _plain(unit: str) -> str:
     unit = re.sub(r'_?(?:\bper\b|_per_|_)\s*', '/', unit)
     unit = re.sub(r'sec(?:ond)?s?', 's', unit)
     unit = re.sub(r'\b(?:inch|inches)\b', 'in', re.sub(r'\b(?:feet|foot)\b', 'ft', unit))
-    return re.sub(r'[\s*·^]', '', unit)
+    unit = re.sub(r's/(-?2)$', r's\1', unit)  # `m_s_2`
+    return re.sub(r'[\s*·^.]', '', unit).replace('/s-2', '/s2')
+
+
+def _like_a_unit(text: str) -> bool:
+    """Whether a word that is no unit of acceleration is one of something else, or built as one."""
+    text = text.strip(' \t"\'[](){}.,;')
+    if _DIRECTION.fullmatch(text) or ' ' in text:
+        return False
+    parts = [w for w in re.findall(r'[^\W\d_]+', text) if w.lower() not in ('ns', 'ew', 'ud')]
+    built = re.search(r'[/^]', text) and any(is_unit(w) or is_unit(w.lower()) for w in parts)
+    return bool(built) or is_unit(text) or text.lower() in _VELOCITIES
+
+
+def _listed(line: str) -> tuple[str, str]:
+    """Return the units of time and of acceleration that a list of units holds; empty for none."""
+    time = ''
+    for word in re.split(r'[\s,;()]+', line):
+        bare = word.strip('[](){}.:"\'')
+        if symbol(bare) in ROLES['time'] and not time:
+            time = symbol(bare)
+        elif bare == 'SI' or _plain(bare) in _UNITS or _like_a_unit(bare):
+            return time, bare
+        elif bare and not _ABOUT.fullmatch(bare):
+            break
+    return time, ''
 
 
 def _is_table(text: str, period: float) -> bool:
@@ -154,9 +186,13 @@ def _of_heading(path: Path, lines: list[str]) -> float | None:
     told = re.search(rf'({_OTHER.pattern})\s+(?:time\s+)?(?:series|hist)', text, re.IGNORECASE)
     if told is not None:
         raise InputError(f'{path}: holds {told[1].lower()}, and a ground acceleration is needed')
-    said = [unit.rstrip('.') for unit in _SAID.findall(text)]
-    # Brackets hold remarks as well as units.
-    said += [unit for unit in _BRACKETS.findall(text) if _plain(unit) in _UNITS]
+    said = [unit for line in _SAID.findall(text) if (unit := _listed(line)[1])]
+    told_in = [unit.rstrip('.:') for unit in _IN_PROSE.findall(text)]
+    said += [unit for unit in told_in if _plain(unit) in _UNITS or _like_a_unit(unit)]
+    # Brackets hold remarks as well as units, and `G` may be a station.
+    inside = [re.sub(r'^in\s+', '', unit) for unit in _BRACKETS.findall(text)]
+    said += [unit for unit in inside if _plain(unit) in _UNITS]
+    said += [unit for unit in _LAST.findall(text) if _plain(unit) in _UNITS and unit != 'G']
     factors = {unit: _factor(path, unit) for unit in said}
     if len(set(factors.values())) > 1:
         raise InputError(
@@ -171,6 +207,8 @@ def _factor(path: Path, unit: str) -> float:
     Raises:
         InputError: it is not understood, or of no acceleration.
     """
+    if unit == 'SI':
+        return 1.0
     if _plain(unit) not in _UNITS:
         raise InputError(
             f'{path}: {unit.strip()!r} is no unit of acceleration that is understood; {_MEND}'
@@ -178,24 +216,51 @@ def _factor(path: Path, unit: str) -> float:
     return _UNITS[_plain(unit)]
 
 
-def _unit_in(name: str) -> str:
-    """Return the unit that the name of a column of acceleration has; empty without one."""
-    inside = [text for text in _BRACKETS.findall(name) if not _DIRECTION.fullmatch(text)]
-    if inside:
-        return str(inside[-1])
-    if told := re.search(r'(?<=[\s_])in[\s_]+(.+)$', name):
-        return told[1]
-    # `acceleration_g`, `acceleration_m_per_s2`, `acceleration g`, `acc/g`
-    words = [w for w in re.split(r'[_\s,]+', name) if w and not _DIRECTION.fullmatch(w)]
-    if words == ['a', 'g']:
-        return name  # the symbol of ground acceleration, or a unit: nothing tells which
-    for begin in range(1, len(words)):
-        if _plain('_'.join(words[begin:])) in _UNITS:
-            return '_'.join(words[begin:])
-    last = words[-1] if words else ''
-    if len(words) > 1 and '_' in name and not _ACCELERATION.match(last):
-        return last
-    return last.partition('/')[2]
+def _units_in(name: str) -> list[str]:
+    """Return the units that the name of a column of acceleration has, understood or not."""
+    inside = [re.sub(r'^in\s+', '', text) for text in _BRACKETS.findall(name)]
+    found = [text for text in inside if _plain(text) in _UNITS or _like_a_unit(text)]
+    if found:
+        return found
+    plain = _BRACKETS.sub(' ', name).strip()
+    # `acceleration_g`, `acceleration_m_per_s2_raw`, `acceleration in g`, `acc/g`
+    first, *words = [w for w in re.split(r'[_\s,]+', plain) if w] or ['']
+    if first == 'a' and [w for w in words if not _DIRECTION.fullmatch(w)] == ['g']:
+        return [plain]  # the symbol of ground acceleration, or a unit: nothing tells which
+    words = [*filter(None, [first.partition('/')[2]]), *words]
+    for length in range(len(words), 0, -1):
+        for begin in range(len(words) - length + 1):
+            unit = '_'.join(words[begin : begin + length])
+            if _plain(unit) in _UNITS:
+                return [unit]
+    rest = [w for w in words if not _DIRECTION.fullmatch(w)]
+    # Among words with blanks between them a letter may be anything.
+    shown = rest if '_' in name else [w for w in rest[:-1] if re.search(r'[/^]', w)] + rest[-1:]
+    return [w for w in shown if _like_a_unit(w)][-1:]
+
+
+def _other_quantity(name: str) -> bool:
+    """Whether the name of a column is one of velocity, displacement or force."""
+    plain = _BRACKETS.sub(' ', name).replace('_', ' ')
+    other, own = _OTHER.search(plain), _ACCELERATION.search(plain)
+    return other is not None and (own is None or other.start() < own.start())
+
+
+def _seconds(path: Path, name: str) -> float | None:
+    """Return the factor to s that the name of a column of time says; None where it says none.
+
+    Raises:
+        InputError: another unit of time, or a unit of something else.
+    """
+    words = [*_BRACKETS.findall(name), *re.split(r'[_/\s]+', _BRACKETS.sub(' ', name))[1:]]
+    for word in words:
+        if symbol(word) in ROLES['time']:
+            return ROLES['time'][symbol(word)]
+        if _NOT_SECONDS.fullmatch(word) or _like_a_unit(word):
+            raise InputError(
+                f'{path}: column {name!r} has a unit of time that is not understood; use s or ms'
+            )
+    return None
 
 
 def _pair(line: str) -> tuple[str, str] | None:
@@ -214,42 +279,45 @@ def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple
     Raises:
         InputError: another quantity, or a unit that is not understood.
     """
-    seconds, factors, rest = 1.0, dict[str, float](), list[str]()
+    seconds, factors, rest = set[float](), dict[str, float](), list[str]()
+    named = False
     for line in heading:
         pair = _pair(line)
         bare = pair[0].strip('[](){} ') if pair is not None else ''
         if pair is not None and bare in ROLES['time'] and _plain(pair[1]) in _UNITS:
-            seconds = ROLES['time'][bare]  # a line of units
+            seconds.add(ROLES['time'][bare])  # a line of units
             factors[pair[1]] = _factor(path, pair[1])
             continue
         timed = pair is not None and _TIME.match(pair[0]) is not None
         parted = re.search(r'\S\s*[;\t,]\s*\S', line) is not None
-        if pair is None or not (timed or (parted and _ACCELERATION.search(pair[1]))):
+        if pair is None or not (
+            timed
+            or (parted and _ACCELERATION.search(pair[1]) and not _ACCELERATION.search(pair[0]))
+        ):
             rest.append(line)
             continue
         first, second = pair
-        if _OTHER.search(second.replace('_', ' ')):
+        if _other_quantity(second):
             raise InputError(
                 f'{path}: column {second!r} is no acceleration; give time and ground acceleration'
             )
-        told = ([*_BRACKETS.findall(first), *re.split(r'[_/\s]+', first)[1:]] or [''])[0]
-        if timed and told and told not in ROLES['time']:
-            raise InputError(
-                f'{path}: column {first!r} has a unit of time that is not understood; use s or ms'
-            )
-        seconds = ROLES['time'][told] if timed and told else seconds
-        unit = _unit_in(second)
-        if unit:
-            factors[unit] = _factor(path, unit)
+        told = _seconds(path, first) if timed else None
+        seconds |= set() if told is None else {told}
+        named = named or _ACCELERATION.search(second.replace('_', ' ')) is not None
+        factors |= {unit: _factor(path, unit) for unit in _units_in(second)}
     spoken = _OTHER.search(' '.join(rest).replace('_', ' '))
-    if not factors and spoken is not None:
+    other = _of_heading(path, rest)
+    if other is not None:
+        factors['the line above'] = other
+    if not factors and not named and spoken is not None:
         raise InputError(
             f'{path}: the heading speaks of {spoken[0]}, and no column of acceleration with '
             f'its unit is named; {_MEND}'
         )
-    other = _of_heading(path, rest)
-    if other is not None:
-        factors['the line above'] = other
+    listed = [_listed(line)[0] for line in _SAID.findall('\n'.join(rest))]
+    seconds |= {ROLES['time'][unit] for unit in listed if unit}
+    if len(seconds) > 1:
+        raise InputError(f'{path}: the heading says two units of time; keep the one that it is in')
     if len(set(factors.values())) > 1:
         raise InputError(
             f'{path}: the heading says two units of acceleration ({" and ".join(factors)}); keep '
@@ -260,7 +328,7 @@ def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple
             f'{path}: says no unit of acceleration, so m/s^2 was taken; where it is another one, '
             f'{_MEND}'
         )
-    return seconds, next(iter(factors.values()), 1.0)
+    return next(iter(seconds), 1.0), next(iter(factors.values()), 1.0)
 
 
 def _columns(path: Path, text: str, warn: Callable[[str], None]) -> GroundMotion:

@@ -221,6 +221,11 @@ def symbol(unit: str) -> str:
     return _WORDS.get(plain.removesuffix('s'), _WORDS.get(plain, bare))
 
 
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit that is known here, of whatever quantity."""
+    return symbol(text) in _KNOWN
+
+
 def contradict(named: str, stated: str) -> bool:
     """Return whether the unit in a column's name and what the file gives as its unit differ.
 

@@ -68,6 +68,17 @@ def test_files(tmp_path: Path) -> None:
         ('Time;Acceleration NS\n(s);(Gal)', 1e-2),
         ('El Centro, peak velocity 33 cm/s\ntime,acc [g] (NS)', GRAVITY),
         ('# DT = 0.02\n# time_s,acceleration_g', GRAVITY),
+        ('time [s],acc [cm/s2] (filtered)', 1e-2),
+        ('# Units: s, cm/s^2', 1e-2),
+        ('# Units: SI', 1.0),
+        ('# acceleration in cm/s2, baseline corrected in velocity', 1e-2),
+        ('# shake table speed 0.01\n# acceleration in cm/s2', 1e-2),
+        ('# used for displacement control\ntime_s,acceleration_cm/s2', 1e-2),
+        ('time [s],acc [cm.s-2]', 1e-2),
+        ('time,acc_cm_s_2', 1e-2),
+        ('time,acc_cms2', 1e-2),
+        ('time,acc_g_filtered', GRAVITY),
+        ('time,acceleration [g] (velocity corrected)', GRAVITY),
     ],
 )
 def test_the_unit_is_the_one_that_the_heading_says(
@@ -96,11 +107,57 @@ def test_what_says_no_unit_is_metres_and_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    'heading',
+    [
+        'time,acc (filtered)',
+        'time_s,acceleration_filtered',
+        'time,acceleration_raw',
+        'time,acc_scaled',
+        'time,ug_ddot',
+        'time_elapsed,acc',
+        '# corrected for velocity\ntime,acc',
+        'time,acc (NS/EW)',
+    ],
+)
+def test_words_that_are_no_unit_say_none(heading: str, tmp_path: Path) -> None:
+    """Read as m/s^2, and told."""
+    lines: list[str] = []
+    path = tmp_path / 'record.csv'
+    path.write_text(f'{heading}\n0,0\n0.5,1\n1,-1\n')
+    found = read_ground_motion(path, lines.append)
+    assert (np.abs(found.acceleration).max(), found.period) == (1.0, 0.5)
+    assert len(lines) == 1 and 'm/s^2 was taken' in lines[0]
+
+
+def test_times_in_a_list_of_units(tmp_path: Path) -> None:
+    """Milliseconds are not seconds there either."""
+    path = tmp_path / 'record.csv'
+    path.write_text('# Units: ms, g\ntime,acc\n0,0\n5,0.1\n10,-0.1\n')
+    found = read_ground_motion(path)
+    assert found.period == pytest.approx(5e-3)
+    assert found.acceleration[1] == pytest.approx(0.1 * GRAVITY)
+
+
+@pytest.mark.parametrize('heading', ['El Centro acceleration in g', 'Record of El Centro, g'])
+def test_headings_of_at2_that_say_their_unit_otherwise(heading: str, tmp_path: Path) -> None:
+    """In a sentence, or at its end."""
+    path = tmp_path / 'record.at2'
+    path.write_text(f'{heading}\nNPTS= 2, DT= .01\n0.1 0.2\n')
+    assert read_ground_motion(path).acceleration[0] == pytest.approx(0.1 * GRAVITY)
+
+
+@pytest.mark.parametrize(
     ('text', 'said'),
     [
         ('time_s,velocity_m/s\n0,1\n0.1,2\n', 'is no acceleration'),
         ('time [s], v\nVelocity [m/s]\n0,1\n0.1,2\n', 'speaks of Velocity'),
-        ('time_s,acceleration_furlong\n0,1\n0.1,2\n', "'furlong' is no unit of acceleration"),
+        ('time_s,acceleration_furlong/s2\n0,1\n0.1,2\n', "'furlong/s2' is no unit of acc"),
+        ('time_s,acceleration_mm\n0,1\n0.1,2\n', "'mm' is no unit of acceleration"),
+        ('time_s,acceleration (Volts)\n0,1\n0.1,2\n', "'Volts' is no unit of acceleration"),
+        ('time_s,acc_cm_s\n0,1\n0.1,2\n', 'is no unit of acceleration'),
+        ('time_s,acc [g] (m/s2)\n0,1\n0.1,2\n', 'two units'),
+        ('# Units: ms, g\ntime_s,acc\n0,1\n0.1,2\n', 'two units of time'),
+        ('time_s,displacement_mm\n0,1\n0.1,2\n', 'is no acceleration'),
         ('time_s,acceleration [m/s]\n0,1\n0.1,2\n', "'m/s' is no unit of acceleration"),
         ('# units: g\ntime_s,acceleration_m/s2\n0,1\n0.1,2\n', 'two units'),
         ('time_min,acceleration_g\n0,1\n0.1,2\n', 'unit of time'),
