@@ -125,7 +125,7 @@ def read_head(
         line = uncommented(top[header_lines - 1]) if header_lines else ''
     if line and not units and len(top) > header_lines:
         below = uncommented(top[header_lines])
-        units = units_line(fields_of(below, delimiter or _best_delimiter(line, below)))
+        units = units_line(fields_of(below, delimiter or _of_units(line, below)))
         header_lines += bool(units)
     rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
     if delimiter is None:
@@ -211,6 +211,14 @@ def _best_delimiter(names: str, row: str) -> str | None:
         )
 
     return max((*DELIMITERS, None), key=fit)
+
+
+def _of_units(names: str, units: str) -> str | None:
+    """Return what parts a line of units, None for blanks: units may have blanks within them."""
+    for delimiter in DELIMITERS:
+        if 1 < len(fields_of(names, delimiter)) == len(fields_of(units, delimiter)):
+            return delimiter
+    return _best_delimiter(names, units)
 
 
 def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
