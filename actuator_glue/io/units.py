@@ -43,6 +43,7 @@ _NAME = re.compile(
     re.IGNORECASE,
 )
 _BRACKETS = re.compile(r'[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]')
+_WHOLE = re.compile(r'^[\[(]+\s*([^\[\]()]*?)\s*[\])]+$')  # all in brackets
 _OF_MATRIX = re.compile(r'\((?::,\d+|\d+,:)\)\s*$')  # which column of a matrix, as MATLAB says it
 _MOVING = ('command', 'measured')
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
@@ -84,7 +85,23 @@ _WORDS = {
     'count': 'counts',
     'newtonmeter': 'Nm',
     'newtonmetre': 'Nm',
+    'sekunde': 's',
+    'sekunden': 's',
+    'millisekunde': 'ms',
+    'millisekunden': 'ms',
+    'zoll': 'in',
+    'grad': 'deg',
+    'prozent': '%',
 }
+# Units that no scale is known for here, in small letters and without the `s` of the plural.
+_ELSEWHERE = frozenset(
+    ('foot', 'feet', 'ft', 'yard', 'mil', 'thou', 'km', 'kilometer', 'kilometre', 'nanometer')
+)
+_ELSEWHERE |= {'nanometre', 'lb', 'pound', 'kgf', 'dan', 'tonf', 'kg', 'kilogram', 'gram'}
+_ELSEWHERE |= {'minute', 'hour', 'day', 'ampere', 'amp', 'ohm', 'hertz', 'khz', 'pascal', 'kelvin'}
+_ELSEWHERE |= {'celsius', 'fahrenheit', 'microstrain', 'ustrain', 'strain', 'gal'}
+# Units that are words of other meanings too, where more words stand beside them.
+_EVERYDAY = frozenset(('in', 'g', 'bar', 'inc', 'rev', 'turn', 'turns', 'second', 'count', 'day'))
 # What stands in the place of a unit and is none.
 _NONE = frozenset(
     ('', '1', '?', 'none', 'n/a', 'na', 'nan', 'null', 'nil', 'unknown', 'undefined')
@@ -217,7 +234,9 @@ def symbol(unit: str) -> str:
     plain = bare.casefold()
     if plain in _NONE or not plain.strip('-\u2013\u2014_.* '):
         return ''
-    plain = re.sub(r'\s+since\b.*|[\s-]', '', plain)
+    if bare.rstrip('.') in _KNOWN:
+        return bare.rstrip('.')
+    plain = re.sub(r'\s+since\b.*|[\s-]', '', re.sub(r'(?<=[a-z])\(s\)?$', 's', plain).rstrip('.'))
     return _WORDS.get(plain.removesuffix('s'), _WORDS.get(plain, bare))
 
 
@@ -229,19 +248,49 @@ def is_unit(text: str) -> bool:
 def contradict(named: str, stated: str) -> bool:
     """Return whether the unit in a column's name and what the file gives as its unit differ.
 
-    Spellings of one unit contradict nothing, nor does anything beside a name without a unit that
-    is known here. What the file gives and is not understood differs from any unit of a name,
-    unless only its capitals do: those of `M` and `m` are a factor of a billion.
+    They do where that is another unit, or holds one and not the named one: `Volts`, `Length (m)`.
+    Spellings of one unit contradict nothing, nor do words that are no unit, nor anything beside a
+    name without a unit that is known here. Where only the capitals differ they do not, unless
+    these are of `M` and `m`, a factor of a billion.
     """
-    named, stated = symbol(named), symbol(stated)
-    known, other = _SIZES.get(named), _SIZES.get(stated)
-    if known is None or not stated:
+    named, whole = symbol(named), symbol(stated)
+    known = _SIZES.get(named)
+    if known is None or not whole:
         return False
-    if other is not None:
-        return known != other
-    if named.casefold() != stated.casefold():
+    if whole in _SIZES:
+        return known != _SIZES[whole]
+    if named.casefold() == whole.casefold():
+        return not whole.isupper() and {named[0], whole[0]} == {'m', 'M'}
+    if whole.casefold() in _LOWER or _elsewhere(whole):
         return True
-    return not stated.isupper() and {named[0], stated[0]} == {'m', 'M'}
+    found = _units_within(stated)
+    return bool(found) and not any(
+        _SIZES.get(unit) == known or unit.casefold() == named.casefold() for unit in found
+    )
+
+
+def _elsewhere(word: str) -> bool:
+    """Whether a word is a unit that no scale is known for here: by its name, or made of others."""
+    small = word.casefold()
+    if small in _ELSEWHERE or small.removesuffix('s') in _ELSEWHERE:
+        return True
+    first, *behind = re.split(r'[/^*·]', word)
+    return bool(behind) and small not in _NONE and is_unit(first)
+
+
+def _units_within(text: str) -> list[str]:
+    """Return the units among the words of a text: `mm (abs)`, `Length (mm)`, `Weg/mm`."""
+    inside = [entry.strip() for entry in _BRACKETS.findall(text)]
+    found = [symbol(entry) for entry in inside if is_unit(entry) or _elsewhere(entry)]
+    plain = re.sub(r'\s*/\s*', '/', re.sub(r'(?<=\w)\(s\)', 's', text))
+    for word in re.split(r'[\s_,;]+', _BRACKETS.sub(' ', plain)):
+        tail = word.partition('/')[2]
+        word = tail if tail and not is_unit(word.partition('/')[0]) else word.strip(':;.')
+        if word.casefold() not in (*_NONE, *_EVERYDAY) and (is_unit(word) or _elsewhere(word)):
+            found.append(symbol(word))
+        elif word.isupper() and len(word) > 1 and word.casefold() in _KNOWN:
+            found.append(word)
+    return found
 
 
 def units_line(entries: list[str]) -> list[str]:
@@ -250,7 +299,7 @@ def units_line(entries: list[str]) -> list[str]:
     Each entry is a unit, in brackets or not, empty, or a dash; at least one unit is known here.
     """
     known = ANGLES.union(*ROLES.values())
-    units = [entry.strip().strip('[]()').strip() for entry in entries]
+    units = [_WHOLE.sub(r'\1', entry.strip()) for entry in entries]
     short = all(len(u) <= 12 and not _is_number(u) for u in units)
     return units if short and any(symbol(u) in known for u in units) else []
 

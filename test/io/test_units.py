@@ -114,7 +114,12 @@ def test_a_unit_of_something_else_is_named(
         ('s,mm,Degrees', "'measured_mm' .* 'Degrees'"),
         ('s,mm,Newtons', "'measured_mm' .* 'Newtons'"),
         ('s,mm,Mm', "'measured_mm' .* 'Mm'"),
-        ('s,mm,furlong', "'measured_mm' .* 'furlong'"),
+        ('s,mm,feet', "'measured_mm' .* 'feet'"),
+        ('s,mm,mm/min', "'measured_mm' .* 'mm/min'"),
+        ('s,mm,Length (m)', r"'measured_mm' .* 'Length \(m\)'"),
+        ('s,mm,m abs', "'measured_mm' .* 'm abs'"),
+        ('s,mm,CM', "'measured_mm' .* 'CM'"),
+        ('Minutes,mm,mm', "'time_s' .* 'Minutes'"),
     ],
 )
 def test_units_that_contradict_are_refused(tmp_path: Path, units: str, said: str) -> None:
@@ -153,6 +158,21 @@ def test_units_in_a_file_contradict_its_names(
         'Seconds,MILLIMETRES,(mm)',
         's,MM,n/a',
         's,none,mm',
+        'sec.,mm.,mm',
+        'Sec.,mm (abs),mm rel',
+        'Sekunden,mm [peak],mm_disp',
+        'second(s),mm,Length (mm)',
+        'elapsed s,mm,in mm',
+        's,mm,n.a.',
+        's,mm,EU',
+        's,mm,Unit',
+        's,mm,unknown unit',
+        's,mm,user-defined',
+        's,mm,length',
+        's,mm,physical',
+        's,mm,scaled',
+        'Time,mm,furlong',
+        'hh:mm:ss,mm,mm',
     ],
 )
 def test_units_said_twice_alike_are_read(tmp_path: Path, units: str) -> None:
@@ -181,7 +201,35 @@ def test_words_are_units_in_any_capitals_and_symbols_in_their_own(
 ) -> None:
     """A word has no other meaning in capitals; `mN` is no meganewton, and is not guessed."""
     assert symbol(written) == meant
-    assert contradict('kN', written) == (meant not in ('kN', ''))
+    assert contradict('kN', written) == (meant not in ('kN', '', 'furlong'))
+
+
+@pytest.mark.parametrize(
+    ('named', 'stated'),
+    [
+        ('N', 'N.'),
+        ('mm', 'mm, absolute'),
+        ('mm', 'displacement'),
+        ('mm', 'Displacement'),
+        ('mm', 'From Custom Scale'),
+        ('mm', 'Custom'),
+        ('mm', 'second axis'),
+        ('mm', 'Weg / mm'),
+        ('mm', 'MM ABS'),
+    ],
+)
+def test_words_that_state_no_other_unit_contradict_nothing(named: str, stated: str) -> None:
+    """Remarks, scales of an acquisition, quantities; the unit itself among other words."""
+    assert not contradict(named, stated)
+
+
+@pytest.mark.parametrize('stated', ['Volts', 'INCHES', 'meters', 'Newtons', 'KN', '%', 'counts'])
+def test_another_unit_in_any_capitals_contradicts(stated: str) -> None:
+    """The same words beside a name in millimetres, alone or with a remark."""
+    assert contradict('mm', stated)
+    if stated.casefold() != 'kn':
+        assert contradict('mm', f'{stated} (raw)')
+    assert contradict('N', stated) == (stated != 'Newtons')
 
 
 def test_a_unit_that_a_file_spells_out_holds_where_the_name_has_none(tmp_path: Path) -> None:
