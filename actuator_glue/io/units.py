@@ -189,12 +189,17 @@ def common_motion(units: dict[str, str], where: str) -> str:
 def recognise(name: str) -> tuple[str, str] | None:
     """Return role and unit of a column name such as `command_mm` or `Force [kN]`.
 
-    The unit is empty where the name has none; None where the name is no role.
+    The unit is empty where the name has none; None where the name is no role. Of several words
+    in brackets (`Force [Kilo Newton]`) it is one where they are understood.
     """
-    match = _NAME.fullmatch(_OF_MATRIX.sub('', name).strip())
-    if match is None:
-        return None
-    return match['role'].lower(), match['unit'] or ''
+    plain = _OF_MATRIX.sub('', name).strip()
+    match = _NAME.fullmatch(plain)
+    if match is not None:
+        return match['role'].lower(), match['unit'] or ''
+    words = re.search(r'[\[(]\s*([^\[\]()]+ [^\[\]()]+?)\s*[\])]$', plain)
+    if words is not None and is_unit(words[1]):
+        match = _NAME.fullmatch(f'{plain[: words.start()]}[{symbol(words[1])}]')
+    return (match['role'].lower(), match['unit'] or '') if match is not None else None
 
 
 def bare(name: str) -> str:

@@ -232,6 +232,13 @@ def test_another_unit_in_any_capitals_contradicts(stated: str) -> None:
     assert contradict('N', stated) == (stated != 'Newtons')
 
 
+@pytest.mark.parametrize('name', ['Force [Kilo Newton]', 'force (kilo newtons)', 'Force [kN]'])
+def test_a_unit_of_two_words_in_a_name(name: str) -> None:
+    """The column is the force, and not left out without a word."""
+    assert recognise(name) == ('force', 'kN')
+    assert recognise('Command (of the table)') is None
+
+
 def test_a_unit_that_a_file_spells_out_holds_where_the_name_has_none(tmp_path: Path) -> None:
     """An attribute `meters` of a dataset `command`."""
     path = tmp_path / 'a.h5'
