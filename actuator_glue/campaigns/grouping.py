@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
+from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from datetime import UTC, datetime
@@ -193,7 +194,9 @@ def tasks_of(given: Sequence[Path | str], recipe: Recipe) -> list[Task]:
     analysis = recipe.analysis()
     groups: dict[str, list[tuple[Member, dict[str, str]]]] = {}
     used: set[str] = set()
-    for member in files_below(given, recipe.files):
+    found = list(files_below(given, recipe.files))
+    alone = _apart(found)
+    for member in found:
         entry = next((n for n in (member.name, Path(member.path).name) if n in told), None)
         used |= {entry} if entry is not None else set()
         try:
@@ -206,7 +209,7 @@ def tasks_of(given: Sequence[Path | str], recipe: Recipe) -> list[Task]:
             said |= _by_itself(member, missing)
         # A file that does not say by what to group it stands alone.
         keys = [said.get(key) for key in recipe.group]
-        named = '/'.join(map(str, keys)) if keys and None not in keys else member.name
+        named = '/'.join(map(str, keys)) if keys and None not in keys else alone[member.path]
         groups.setdefault(named, []).append((member, said))
     lacking = sorted(set(told) - used)
     if lacking:
@@ -215,6 +218,28 @@ def tasks_of(given: Sequence[Path | str], recipe: Recipe) -> list[Task]:
             f'{recipe.table}: {len(lacking)} of its files are not among the records: {listed}'
         )
     return [_task(name, groups[name], analysis) for name in sorted(groups)]
+
+
+def _apart(members: Sequence[Member]) -> dict[str, str]:
+    """Return a name of its own for each file, by its path.
+
+    Its name below the folder that was given; where files of several folders share that, the
+    shortest end of its path that no other has.
+    """
+    alike: dict[str, list[str]] = {}
+    for member in members:
+        alike.setdefault(member.name, []).append(member.path)
+    names = {paths[0]: name for name, paths in alike.items() if len(paths) == 1}
+    taken = Counter(names.values())
+    ends = {path: _ends(path) for many in alike.values() for path in many if path not in names}
+    taken.update(end for own in ends.values() for end in own)
+    return names | {path: next(e for e in own if taken[e] == 1) for path, own in ends.items()}
+
+
+def _ends(path: str) -> list[str]:
+    """Return all ends of a path, the shortest first."""
+    parts = Path(path).parts
+    return [Path(*parts[first:]).as_posix() for first in range(len(parts) - 1, -1, -1)]
 
 
 def _with(member: Member, said: dict[str, str], holdout: str | None) -> Member:

@@ -27,6 +27,32 @@ def test_without_a_recipe_every_file_is_a_group(records: Path) -> None:
     assert len({t.group for t in tasks}) == 12
 
 
+def test_files_of_one_name_in_several_folders_are_groups(tmp_path: Path) -> None:
+    """By the shortest paths that tell them apart; a recipe's keys group them as before."""
+    for name in ('a/free.csv', 'b/free.csv', 'b/end.csv', 'c/x/free.csv', 'c/y/x/free.csv'):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(name)
+    a, b, c = (tmp_path / name for name in 'abc')
+
+    def groups(*given: Path) -> list[str]:
+        tasks = tasks_of(given, Recipe())
+        assert all(len(task.members) == 1 for task in tasks)
+        return [task.group for task in tasks]
+
+    assert groups(a, b) == ['a/free.csv', 'b/free.csv', 'end.csv']
+    assert groups(a / 'free.csv', b / 'free.csv') == ['a/free.csv', 'b/free.csv']
+    assert groups(c / 'x', c / 'y') == ['free.csv', 'x/free.csv']
+    assert groups(c / 'x', c / 'y' / 'x') == ['c/x/free.csv', 'y/x/free.csv']
+    both = ['a/free.csv', 'b/free.csv', 'c/x/free.csv', 'end.csv', 'y/x/free.csv']
+    assert groups(a, b, c / 'x', c / 'y' / 'x', c / 'y') == both
+    keyed = recipe_of(tmp_path, names='(?P<specimen>free|end)', group=['specimen'])
+    assert [(t.group, len(t.members)) for t in tasks_of([a, b], keyed)] == [
+        ('end', 1),
+        ('free', 2),
+    ]
+
+
 def test_names_group_by_actuator_and_day(records: Path) -> None:
     """What tests of a group have in common is told; what differs is not."""
     (tasks) = tasks_of([records], recipe_of(records, names=NAMES, group=['actuator', 'day']))
