@@ -54,6 +54,7 @@ _ROUGH = 1.4826  # from the median deviation to a standard one
 # Times are reported to be off if that causes this share of the misfit between neighbours, and they
 # are off by more than this share of a step.
 _FELT, _EXACT = 0.1, 1e-3
+_FEWEST = 5  # samples: a cubic through four, and the one that it foretells
 _LOOK = 20_000  # samples from which band and noise are told
 _WINDOW = ('kaiser', 8.0)  # a ripple of 2e-4; scipy's own has 1e-3
 _APART = 64  # samples between impulses, farther than any of them is felt
@@ -176,11 +177,16 @@ def resample_evenly(
     """
     one_of(by, 'resampling by', get_args(By))
     time = values['time']
+    if len(time) < _FEWEST:
+        raise InputError(
+            f'{where}: {len(time)} samples are too few to be resampled; at least {_FEWEST} are '
+            'needed'
+        )
     steps = np.diff(time)
     channels = {role: column for role, column in values.items() if role != 'time'}
     even, clock = _even_clock(time, channels, rate, where)
-    if len(steps) < 3 or not np.isfinite(time).all() or not (steps.min() > 0.0 or len(even)):
-        at = int((~(steps > 0.0)).argmax()) if len(steps) else 0
+    if not np.isfinite(time).all() or not (steps.min() > 0.0 or len(even)):
+        at = int((~(steps > 0.0)).argmax())
         raise InputError(
             f'{where}: time does not go up after sample {at}; sort the record, or cut it there'
         )
@@ -246,6 +252,8 @@ def _cut(time: Array, command: Array, rate: float) -> tuple[float, float]:
     """
     curve = scipy.interpolate.CubicSpline(time, command)
     at = _even_times(time, rate)
+    if len(at) < 2:  # of very few samples
+        return 0.0, 0.0
     ends = curve(at)
     middle = curve(at[:-1] + 0.5 / rate) - 0.5 * (ends[:-1] + ends[1:])
     missed = _OF_MIDDLE * float(np.sqrt(np.mean(middle**2)))

@@ -227,6 +227,15 @@ def test_nothing_is_invented(tmp_path: Path, time: np.ndarray, rate: float, word
         load_records(table(tmp_path / 'a.csv', time), resample=rate)
 
 
+@pytest.mark.parametrize('count', [1, 2, 3, 4])
+def test_few_samples_are_called_few(count: int) -> None:
+    """They ascend: nothing else is wrong with them."""
+    time = np.array([0.0, 0.011, 0.05, 0.06])[:count]
+    with pytest.raises(InputError, match=f'{count} samples are too few .* at least 5'):
+        resample_evenly(channels(time, time), 60.0, where='x')
+    assert len(resample_evenly(channels(TIME[:6], TIME[:6]), 5.0, where='x').values['command']) == 1
+
+
 def test_the_command_line_resamples_on_request_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
