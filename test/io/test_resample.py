@@ -140,6 +140,74 @@ def test_late_stamps_are_no_lost_samples() -> None:
         assert resample_evenly(fast(stamps, true), 100.0, where='x').clock == 'of 100 Hz'
 
 
+def stamped(late: np.ndarray, lost: int | None = None, jitter: float = 0.03) -> None:
+    """Resample even samples of 100 Hz with stamps that are late, in periods; one may be lost."""
+    count = len(late)
+    true = np.arange(count + 1) / 100.0
+    true = true[:-1] if lost is None else np.delete(true, lost + 1)
+    noise = jitter * np.random.default_rng(1).standard_normal(count)
+    stamps = true + 0.01 * (late + noise)
+    made = resample_evenly(fast(stamps - stamps[0], 0.1 * true), 100.0, where='x')
+    assert made.late > 0.0  # an even clock was taken
+
+
+def held_up(count: int, begin: int, stall: float, length: int) -> np.ndarray:
+    """Return by how many periods stamps are late from a hold-up until the log has caught up."""
+    behind = np.arange(count) - begin
+    return np.where((behind >= 0) & (behind < length), stall * (1.0 - behind / length), 0.0)
+
+
+@pytest.mark.parametrize('stall', [1.0, 2.0, 3.0, 4.5])
+@pytest.mark.parametrize('length', [12, 20, 30, 60])
+def test_a_log_that_catches_up_has_lost_nothing(stall: float, length: int) -> None:
+    """Held up once, in the middle or near an end, it is as far off behind as before."""
+    for begin in (3000, 60, 5880):
+        stamped(held_up(6000, begin, stall, length))
+    stamped(held_up(300, 150, stall, length))
+
+
+def test_clocks_that_move_slowly_have_lost_nothing() -> None:
+    """From the first samples on, or while a clock is set by a time server."""
+    for count in (300, 2000, 12000):
+        index = np.arange(count)
+        stamped(3.0 * (1.0 - np.exp(-index / 20.0)))
+        stamped(3.0 * np.exp(-index / 20.0))
+        stamped(2.0 * np.clip((index / count - 0.4) * 4.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize(('stall', 'length'), [(1.0, 10), (3.0, 20), (4.0, 60)])
+@pytest.mark.parametrize('ahead', [-30, 0, 30, 100])
+def test_a_lost_sample_beside_a_hold_up_is_found(stall: float, length: int, ahead: int) -> None:
+    """Where it was lost, or where the log was held up while it was lost."""
+    with pytest.raises(InputError, match=r'about 1 sample.s. are missing') as caught:
+        stamped(held_up(6000, 3001 - ahead, stall, length), 3000)
+    place = re.search(r'(?:after|near) sample (\d+)', str(caught.value))
+    assert place is not None and abs(int(place[1]) - 3000) <= (40 if ahead == 30 else 5)
+
+
+@pytest.mark.parametrize('lost', [1, 2, 8])
+@pytest.mark.parametrize('rate', [512.0, 640.0, 800.0])
+def test_the_place_of_a_loss_is_told_of_coarse_stamps(rate: float, lost: int) -> None:
+    """Three decimals, of 8000 samples."""
+    for place in (1000, 4000):
+        true = np.delete(0.3 + np.arange(8000 + lost) / rate, slice(place + 1, place + 1 + lost))
+        with pytest.raises(InputError, match=r'missing|without samples after') as caught:
+            resample_evenly(fast(np.round(true, 3), true), rate, where='x')
+        told = re.search(r'(?:after|near) sample (\d+)', str(caught.value))
+        assert told is not None and abs(int(told[1]) - place) <= 1
+
+
+@pytest.mark.parametrize('places', [[500, 900, 1300, 2500, 3100], [1000, 1060], [3500]])
+def test_samples_lost_in_several_places_are_found(places: list[int]) -> None:
+    """The message names one of them."""
+    true = np.delete(np.arange(COUNT + len(places)), np.array(places) + 1) / 100.0
+    stamps = true + 3e-4 * np.random.default_rng(1).standard_normal(COUNT)
+    with pytest.raises(InputError, match='missing') as caught:
+        resample_evenly(fast(stamps - stamps[0], 0.1 * true), 100.0, where='x')
+    place = re.search(r'(?:after|near) sample (\d+)', str(caught.value))
+    assert place is not None and min(abs(int(place[1]) - p) for p in places) <= len(places)
+
+
 @pytest.mark.parametrize('rate', [997.0, 512.0, 640.0, 2000.0])
 def test_a_clock_beside_that_of_its_stamps_lacks_nothing(rate: float) -> None:
     """Its stamps slip by a millisecond now and then; the rate that is proposed is the clock's."""
@@ -233,7 +301,9 @@ def test_few_samples_are_called_few(count: int) -> None:
     time = np.array([0.0, 0.011, 0.05, 0.06])[:count]
     with pytest.raises(InputError, match=f'{count} samples are too few .* at least 5'):
         resample_evenly(channels(time, time), 60.0, where='x')
-    assert len(resample_evenly(channels(TIME[:6], TIME[:6]), 5.0, where='x').values['command']) == 1
+    assert (
+        len(resample_evenly(channels(TIME[:6], TIME[:6]), 5.0, where='x').values['command']) == 1
+    )
 
 
 def test_the_command_line_resamples_on_request_alone(
