@@ -37,6 +37,8 @@ _FITTED = 3.0
 # motion: a machine without noise leaves less, a measurement more.
 _NOISE = 2e-5
 _SHARED = 0.5  # of the noise: what is left of it between copies; between two tests more than all
+# Noise is seen in what is written if it is so much of a step: rounding alone leaves 0.29 of one.
+_VISIBLE = 0.5
 _BEFORE, _LAGS, _TAKEN = 8, 40, 4000  # samples of motion and command, and how many are foretold
 
 
@@ -173,7 +175,12 @@ def _same(one: Array, other: Array, shift: int, command: Array) -> bool:
     slack = _FITTED / np.sqrt(len(a))
     return (
         _rounds(np.abs(apart), b, slack) or _rounds(np.abs(apart) / abs(gain), a, slack)
-    ) and _noise_is_shared(apart, other_centred, command[begin:end])
+    ) and _noise_is_shared(
+        apart,
+        other_centred,
+        command[begin:end],
+        step=float(np.median(np.maximum(_step(b), abs(gain) * _step(a)))),
+    )
 
 
 def _near(apart: Array, values: Array) -> bool:
@@ -205,16 +212,17 @@ def _rounds(apart: Array, written: Array, slack: float = 0.0) -> bool:
     return within(slice(None), _step(written))
 
 
-def _noise_is_shared(apart: Array, values: Array, command: Array) -> bool:
+def _noise_is_shared(apart: Array, values: Array, command: Array, *, step: float) -> bool:
     """Whether two channels have one noise: it is far more than what is left between them.
 
     Noise is what neither earlier samples nor the command foretell; both are looked at through the
-    filter that leaves the least of one.
+    filter that leaves the least of one. A coarse channel shows none: it is alike in two tests.
 
     Args:
         apart: one channel in the size of the other, less the other, (n,) [m].
         values: the other, about its mean, (n,) [m].
         command: what it followed, (n,) [m].
+        step: to which the coarser one is written, in the size of the other [m].
     """
     begin = max(0, (len(values) - _TAKEN) // 2)
     part = slice(begin, begin + _TAKEN)
@@ -229,7 +237,8 @@ def _noise_is_shared(apart: Array, values: Array, command: Array) -> bool:
     noise = y[-ahead:] - basis @ weights
     own = [r[len(r) - ahead - k : len(r) - k] / size[0] for k in range(1, _BEFORE + 1)]
     left = r[-ahead:] - np.column_stack(own) @ weights[:_BEFORE]
-    return bool(noise.std() > _NOISE * size[0] and left.std() < _SHARED * noise.std())
+    visible = max(_NOISE * size[0], _VISIBLE * step)
+    return bool(noise.std() > visible and left.std() < _SHARED * noise.std())
 
 
 def _changes(values: Array) -> int:

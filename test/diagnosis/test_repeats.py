@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 import actuator_glue as ag
 from actuator_glue.api.simulation import Sensors
@@ -94,6 +95,26 @@ def test_machines_without_noise_are_no_copies(shape: str, count: int | None) -> 
         measured = test.measured if count is None else digits(test.measured, count)
         made.append(replace(test, measured=measured))
     refuse_repeats(made)
+
+
+@pytest.mark.parametrize(('gain', 'zero'), [(1.0, 1e-4), (-1.0, 0.0), (2.0, 0.0)])
+@pytest.mark.parametrize(('size', 'step'), [(1e-3, 1e-5), (1e-3, 1e-4), (1e-2, 1e-4)])
+def test_coarse_channels_that_show_no_noise_are_no_copies(
+    gain: float, zero: float, size: float, step: float
+) -> None:
+    """Triangles of two tests, written in steps that are far coarser than their noise."""
+    time = np.arange(2000) / 1000.0
+    motion = size * (2.0 * np.abs((2.0 * time) % 2.0 - 1.0) - 1.0)
+    wave = 2.0 * np.pi * 15.0
+    tops, bottoms, _ = scipy.signal.cont2discrete(([wave**2], [1.0, 1.8 * wave, wave**2]), 1e-3)
+    lag = scipy.signal.lfilter(tops.ravel(), bottoms, motion)
+    noise = 1e-6 * np.random.default_rng(0).standard_normal((2, 2000))
+    tests = [
+        Record(g * motion, step * np.rint((g * lag + z + n) / step), 1e-3, stiffness=0.0)
+        for g, z, n in ((1.0, 0.0, noise[0]), (gain, zero, noise[1]))
+    ]
+    refuse_repeats(tests)
+    refuse_known([tests[1]], [sketch(tests[0])], 'monday.npz')
 
 
 def test_every_second_sample_is_no_other_test() -> None:
