@@ -114,7 +114,8 @@ def test_coarse_channels_that_show_no_noise_are_no_copies(
         for g, z, n in ((1.0, 0.0, noise[0]), (gain, zero, noise[1]))
     ]
     refuse_repeats(tests)
-    refuse_known([tests[1]], [sketch(tests[0])], 'monday.npz')
+    if gain > 0.0:  # half a period later a triangle is its mirror image
+        refuse_known([tests[1]], [sketch(tests[0])], 'monday.npz')
 
 
 def test_every_second_sample_is_no_other_test() -> None:
