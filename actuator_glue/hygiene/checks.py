@@ -29,6 +29,10 @@ _DROOPS = 0.08
 _BESIDE = 0.2
 _TELLING = 0.8  # share of the force's variance that displacement and acceleration must explain
 _SURE = 5.0  # standard deviations: noise of a load cell is not quite white
+# One stiffness must explain so much of the force, and what bends or turns with the motion, as
+# friction, a gap, hardening and yield, so little beside it: then small and large motion agree.
+_ONE, _BENT = 0.9, 5e-4
+_TURNS = 0.2  # of the spread of the velocity: friction turns within it
 _SEPARATE = 0.1  # share of the displacement's variance that acceleration must leave
 
 
@@ -189,7 +193,8 @@ def pull(record: Record) -> float | None:
 def beside_stated(records: Sequence[Record]) -> list[str]:
     """Return a sentence on each record whose force tells another stiffness than was given.
 
-    Only where a mass cannot stand behind it, and the difference is beyond what noise makes.
+    Only where one stiffness describes the force at all sizes of motion, a mass cannot stand behind
+    it, and the difference is beyond what noise makes.
     """
     out = []
     for i, record in enumerate(records):
@@ -197,14 +202,37 @@ def beside_stated(records: Sequence[Record]) -> list[str]:
         if not stated or found is None or not (found.explained and found.separate):
             continue
         seen = abs(found.weight)
-        if abs(seen - stated) - _SURE * found.error > _BESIDE * stated:
+        if abs(seen - stated) - _SURE * found.error > _BESIDE * stated and _is_one(record):
             out.append(
                 f'{where(record, i + 1)}: force over displacement tells a specimen stiffness of '
-                f'{seen:.3g} N/m, and {stated:.3g} N/m is given; check which one holds '
-                '(--stiffness, in N/m and in the order of the records), the unit of the force '
-                'channel, and whether the specimen yields'
+                f'{seen:.3g} N/m, and {stated:.3g} N/m is given; small and large motion agree, so '
+                'check which one holds (--stiffness, in N/m and in the order of the records), and '
+                'the unit of the force channel'
             )
     return out
+
+
+def _is_one(record: Record) -> bool:
+    """Whether one stiffness describes the force: the slopes of small and large motion agree."""
+    if record.force is None:
+        return False
+    x, acceleration = _slow(record.measured, record)
+    force, _ = _slow(record.force, record)
+    velocity = np.gradient(x)
+    x, acceleration, velocity = (c / c.std() for c in (x, acceleration, velocity))
+    straight = [np.ones(len(x)), x, acceleration, velocity]
+    # A gap and hardening bend the curve; friction and yield turn with the motion.
+    turning = np.tanh(velocity / _TURNS)
+    bent = [x**2, x**3, np.abs(x) * x, turning, turning * np.abs(x), turning * x**2]
+
+    def left(columns: list[Array]) -> float:
+        basis = np.column_stack(columns)
+        weights, *_ = np.linalg.lstsq(basis, force, rcond=None)
+        return float(np.sum((force - basis @ weights) ** 2)) / float(force @ force)
+
+    one, other = left(straight), left([*straight, *bent])
+    by_chance = _SURE * len(bent) * other / max(len(x) - len(straight) - len(bent), 1)
+    return one <= 1.0 - _ONE and one - other <= _BENT + by_chance
 
 
 def most_push(record: Record) -> float | None:

@@ -9,7 +9,7 @@ import scipy
 import actuator_glue as ag
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.errors import InputError
-from actuator_glue.hygiene.checks import check
+from actuator_glue.hygiene.checks import beside_stated, check
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.records import Record
@@ -225,3 +225,39 @@ def test_a_stiffness_beside_that_of_the_force_is_told(stated: float, told: int) 
     doubtful = replace(record, stiffness=stated, force=record.force + noise)
     if stated:
         assert not [n for n in clean([doubtful])[1] if 'force over displacement tells' in n]
+
+
+@pytest.mark.parametrize(
+    ('effect', 'stiffness', 'command'),
+    [
+        ('sensor-curve', 50e3, ag.Command('sweep', duration=20.0, amplitude=0.01)),
+        ('specimen-hardening', 250e3, ag.Command('sweep', duration=20.0, amplitude=0.01)),
+        ('specimen-gap', 250e3, ag.Command('noise', duration=20.0)),
+        ('specimen-gap', 1e6, ag.Command('sine', duration=10.0, high=8.0)),
+        ('stribeck-friction', 50e3, ag.Command('sine', duration=10.0, high=2.0)),
+    ],
+)
+def test_a_slope_that_depends_on_the_motion_is_no_other_stiffness(
+    effect: str, stiffness: float, command: ag.Command
+) -> None:
+    """Rightly stated: what bends the force is left to the diagnosis."""
+    assert not beside_stated([ag.simulate(command, stiffness=stiffness, effects=[effect])])
+
+
+@pytest.mark.parametrize(
+    'command',
+    [
+        ag.Command('sweep', duration=20.0),
+        ag.Command('noise', duration=20.0),
+        ag.Command('earthquake', duration=20.0),
+    ],
+)
+@pytest.mark.parametrize(('stated', 'unit'), [(125e3, 1.0), (250e3, 1.0 / 4.448)])
+def test_one_stiffness_that_is_not_the_stated_one_is_told(
+    command: ag.Command, stated: float, unit: float
+) -> None:
+    """Half of it, or a force in lbf that is read as one in N."""
+    record = ag.simulate(command, stiffness=250e3, seed=3)
+    assert record.force is not None
+    (told,) = beside_stated([replace(record, stiffness=stated, force=unit * record.force)])
+    assert 'small and large motion agree' in told
