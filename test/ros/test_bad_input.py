@@ -122,7 +122,7 @@ def test_a_recorder_that_is_ended_keeps_what_it_recorded(how, start, probe, tmp_
 def worker_of(process):
     """Process id of a node's worker."""
     pids = children_of(process.process.pid)
-    (worker,) = [p for p in pids if b'spawn_main' in Path(f'/proc/{p}/cmdline').read_bytes()]
+    (worker,) = [p for p in pids if b'workers.worker' in Path(f'/proc/{p}/cmdline').read_bytes()]
     return int(worker)
 
 
