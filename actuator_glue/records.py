@@ -76,7 +76,7 @@ def numbers(values: ArrayLike) -> Array:
             raise TypeError(f'{first} is no displacement or force')
     if isinstance(values, np.ma.MaskedArray):
         return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
-    return np.array(values, dtype=np.float64)
+    return np.array(held, dtype=np.float64)
 
 
 def _column(

@@ -19,7 +19,7 @@ from actuator_glue.io.bag_reader import is_bag
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.io.formats import formats
 from actuator_glue.io.load import load_records
-from actuator_glue.records import Record, check_hold, check_stiffness
+from actuator_glue.records import Record, check_hold, check_stiffness, source_names
 
 # How many names a message lists.
 _LISTED = 3
@@ -226,20 +226,11 @@ def _apart(members: Sequence[Member]) -> dict[str, str]:
     Its name below the folder that was given; where files of several folders share that, the
     shortest end of its path that no other has.
     """
-    alike: dict[str, list[str]] = {}
-    for member in members:
-        alike.setdefault(member.name, []).append(member.path)
-    names = {paths[0]: name for name, paths in alike.items() if len(paths) == 1}
-    taken = Counter(names.values())
-    ends = {path: _ends(path) for many in alike.values() for path in many if path not in names}
-    taken.update(end for own in ends.values() for end in own)
-    return names | {path: next(e for e in own if taken[e] == 1) for path, own in ends.items()}
-
-
-def _ends(path: str) -> list[str]:
-    """Return all ends of a path, the shortest first."""
-    parts = Path(path).parts
-    return [Path(*parts[first:]).as_posix() for first in range(len(parts) - 1, -1, -1)]
+    shared = Counter(member.name for member in members)
+    names = {m.path: m.name for m in members if shared[m.name] == 1}
+    others = [m.path for m in members if m.path not in names]
+    ends = source_names([*names.values(), *others])
+    return names | {path: ends[path] for path in others}
 
 
 def _with(member: Member, said: dict[str, str], holdout: str | None) -> Member:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, numbers
+
+# Conjugate transform of a target, and its length.
+Spectrum: TypeAlias = tuple[NDArray[np.complex128], int]
 
 _LONG = 1 << 20  # samples, of a block and of what is compared in blocks
 
@@ -95,10 +98,8 @@ class TargetMotion:
         return float(np.abs(self._target).max())
 
     @cached_property
-    def _reversed(self) -> tuple[NDArray[np.complex128], int]:
-        """Transform of the reversed target for correlations, and its length."""
-        size = next_fast_len(2 * len(self._target) - 1, real=True)
-        return rfft(self._target[::-1], size), size
+    def _spectrum(self) -> Spectrum | None:
+        return _spectrum(self._target)
 
     def frequency_evaluation(self, measured: Array) -> FrequencyEvaluation:
         """Return the frequency evaluation index (Guo et al. 2014), its angle by atan2.
@@ -123,18 +124,13 @@ class TargetMotion:
             InputError: as `_checked`.
         """
         target, measured = self._target, self._of_target(measured)
-        lag = self._lag(measured) if len(target) <= _LONG else lag_by_blocks(target, measured)
+        lag = largest_lag(target, measured, self._spectrum)
         error = measured - target
         return Criteria(
             lag * self._period,
             float(np.sqrt((error @ error) / (target @ target))),
             float(max(error.max(), -error.min()) / self._peak),
         )
-
-    def _lag(self, measured: Array) -> int:
-        spectrum, size = self._reversed
-        found = irfft(rfft(measured, size) * spectrum, size)[: 2 * len(self._target) - 1]
-        return int(np.argmax(found)) - (len(self._target) - 1)
 
     def tracking_indicator(self, measured: Array) -> float:
         """Return the last value of `tracking_indicator` [m^2], without those before it.
@@ -164,18 +160,27 @@ class TargetMotion:
         return float(lost / whole) if whole > 0.0 else 0.0
 
 
-def largest_lag(target: Array, measured: Array) -> int:
+def _spectrum(target: Array) -> Spectrum | None:
+    """Return what correlations take of a target; None where it is compared in blocks."""
+    if len(target) > _LONG:
+        return None
+    size = next_fast_len(2 * len(target) - 1, real=True)
+    return rfft(target, size).conj(), size
+
+
+def largest_lag(target: Array, measured: Array, known: Spectrum | None = None) -> int:
     """Return the lag of the largest cross-correlation in samples.
 
     Args:
         target: displacement asked for, (n,) [m].
         measured: displacement reached, (n,) [m].
+        known: conjugate transform of the target and its length, where it was made before.
     """
-    n = len(target)
-    if n > _LONG:
+    n, known = len(target), known or _spectrum(target)
+    if known is None:
         return lag_by_blocks(target, measured)
-    size = next_fast_len(2 * n - 1, real=True)
-    found = irfft(rfft(measured, size) * rfft(target, size).conj(), size)
+    spectrum, size = known
+    found = irfft(rfft(measured, size) * spectrum, size)
     # Lags below zero stand at the end.
     lag = int(np.argmax(found))
     return lag if lag < n else lag - size

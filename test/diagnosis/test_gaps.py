@@ -51,5 +51,5 @@ def test_rows_of_one_record_are_whitened_as_rows_of_all(rng_seed: int) -> None:
     scorer = Scorer.of(data, splits_of(data, slow))
     whole = scorer.whiten(data.target)
     for i, part in enumerate(data.parts):
-        own = scorer.whiten_record(i, data.target[part])
+        own = scorer.whiten(data.target[part], i)
         np.testing.assert_array_equal(own, whole[part])

@@ -211,7 +211,7 @@ class Features:
         table: dict[str, NDArray[np.float32]] = {}
         for i, name, feature in self.library():
             row = table.setdefault(name, np.zeros(data.target.size, dtype=np.float32))
-            row[data.parts[i]] = scorer.whiten_record(i, feature.astype(np.float64))
+            row[data.parts[i]] = scorer.whiten(feature.astype(np.float64), i)
         rows, first = list(table.values()), len(table)
         size = first + past.count * len(past.lags)
         products = np.zeros((_FOLDS, size, size))

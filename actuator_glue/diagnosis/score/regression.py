@@ -198,7 +198,7 @@ def _regressed(
     table: dict[str, NDArray[np.float32]] = {}
     for i, name, feature in library(data, theta):
         row = table.setdefault(name, np.empty(len(error), dtype=np.float32))
-        row[data.parts[i]] = scorer.whiten_record(i, feature)
+        row[data.parts[i]] = scorer.whiten(feature, i)
     known = np.vstack([np.linalg.qr(own.T)[0].T, error])
     gram, cross = _products(list(table.values()), known)
     names, start = list(table), np.diag(gram).copy()

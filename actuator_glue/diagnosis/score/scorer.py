@@ -65,21 +65,19 @@ class Scorer:
         """Return the same noise for a part of the data, which has no blocks."""
         return Scorer(part.data, tuple(self.taps[i] for i in part.records), ())
 
-    def whiten(self, rows: Array) -> Array:
-        """Whiten joined rows (..., N), each run without a gap by itself."""
+    def whiten(self, rows: Array, record: int | None = None) -> Array:
+        """Whiten joined rows (..., N), or those of one record (..., n), run by run.
+
+        Each run without a gap is whitened by itself.
+        """
+        which = range(len(self.taps)) if record is None else (record,)
+        start = 0 if record is None else self.data.parts[record].start
         out = np.empty_like(rows)
         table, found = (a.reshape(-1, rows.shape[-1]) for a in (rows, out))
-        for taps, runs in zip(self.taps, self.data.runs, strict=True):
-            for _, run in runs:
-                found[:, run] = whiten(table[:, run], taps)
-        return out
-
-    def whiten_record(self, record: int, samples: Array) -> Array:
-        """Whiten the counted samples (..., n) of one record, as `whiten` does those of all."""
-        out, start = np.empty_like(samples), self.data.parts[record].start
-        for _, run in self.data.runs[record]:
-            own = slice(run.start - start, run.stop - start)
-            out[..., own] = whiten(samples[..., own], self.taps[record])
+        for i in which:
+            for _, run in self.data.runs[i]:
+                own = slice(run.start - start, run.stop - start)
+                found[:, own] = whiten(table[:, own], self.taps[i])
         return out
 
     def block_scores(self, fit: Fit) -> Array:
