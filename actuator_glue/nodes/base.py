@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -147,6 +147,20 @@ class SuiteNode(LifecycleNode):
         )
         self._subscriptions_made.append(made)
         return made
+
+    @staticmethod
+    def arrived(made: Any) -> Iterator[tuple[Any, Any]]:
+        """Take what has arrived at a subscription and was not handed to its callback yet.
+
+        An executor takes one message of each subscription in turn: of two set-ups and a sample
+        that wait together, the second set-up would come after the sample.
+        """
+        while True:
+            with made.handle:
+                taken = made.handle.take_message(made.msg_type, made.raw)
+            if taken is None:
+                return
+            yield taken
 
     def unsubscribe(self, made: Any) -> None:
         """End a subscription before deactivation does."""

@@ -33,15 +33,22 @@ class Latched:
     ) -> None:
         # One that is refused costs neither those after it nor the sample that waits for them.
         self._callback = node.guarded(callback)
+        self._node = node
         self._counts = counts
         self._waiting: list[tuple[float, Any]] = []
         self._sent = self._arrived = 0.0
         self._began = time.time()
-        node.subscribe(topic, self._take, info=True)
+        self._made = node.subscribe(topic, self._take, info=True)
         node.every(_TOGETHER, self._settle_in_time)
 
     def settle(self) -> None:
-        """Hand over what waits; call it with whatever needs the messages, e.g. a sample."""
+        """Hand over all that has come; call it with what needs the messages, e.g. a sample."""
+        for message, info in self._node.arrived(self._made):
+            self._take(message, info)
+        self._hand_over()
+
+    def _hand_over(self) -> None:
+        """Hand over the old messages that wait, in order of sending."""
         old, self._waiting = sorted(self._waiting, key=lambda one: one[0]), []
         for i, (sent, message) in enumerate(old):
             self._sent = sent
@@ -51,7 +58,7 @@ class Latched:
     def _take(self, message: Any, info: Any) -> None:
         sent = 1e-9 * info['source_timestamp']
         if sent >= self._began:
-            self.settle()
+            self._hand_over()
             self._callback(message)
         elif sent >= self._sent:  # of the last one that was handed over
             self._waiting.append((sent, message))
@@ -59,7 +66,7 @@ class Latched:
 
     def _settle_in_time(self) -> None:
         if time.monotonic() - self._arrived >= _TOGETHER:
-            self.settle()
+            self._hand_over()
 
 
 def newest(before: Any, after: Any) -> bool:

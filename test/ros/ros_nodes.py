@@ -78,6 +78,13 @@ class Process:
     def text(self):
         return self.log.read_text(errors='replace')
 
+    @contextmanager
+    def held(self):
+        """Stop it for a while, as a busy machine does; what is sent waits for it."""
+        self.process.send_signal(signal.SIGSTOP)
+        yield
+        self.process.send_signal(signal.SIGCONT)
+
     def end(self, number=signal.SIGINT, timeout=20.0):
         """Send a signal; return the exit status."""
         self.process.send_signal(number)

@@ -34,6 +34,7 @@ def listening(topic=ESTIMATOR_SETUP, counts=newest):
 
     node.guarded = guarded
     node.subscribe = lambda topic, callback, info: setattr(node, 'send', callback)
+    node.arrived = lambda made: ()
     node.every = lambda period, callback: setattr(node, 'tick', callback)
     latched = Latched(node, topic, take, counts)
 
@@ -82,6 +83,16 @@ def test_what_is_sent_from_then_on_is_handed_over_one_by_one():
     sent('first', -1.0)
     sent('second', -1.0)
     assert taken == ['old', 'first', 'second']
+
+
+def test_what_has_arrived_comes_before_the_sample_that_waits_beside_it():
+    """An executor takes one message of each subscription in turn, whatever waits."""
+    latched, node, sent, taken = listening()
+    sent('first', -1.0)
+    later = {'source_timestamp': (time.time() + 2.0) * 1e9}
+    node.arrived = lambda made: iter((('second', later), ('third', later)))
+    latched.settle()
+    assert taken == ['first', 'second', 'third']
 
 
 def test_set_ups_announced_ahead_are_all_handed_over_in_order_of_sending():

@@ -24,12 +24,18 @@ def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe)
     estimator = start('estimator', diagnostics_period=0.2, **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
     probe.open_stream()
-    # What a late joiner gets: both have passed, the second one governs. And one for later.
-    probe.setup(stiffness=-1.0, index=0)
-    probe.setup(index=1000)
-    probe.index = 4000
-    probe.setup(stiffness=-1.0, index=9000)
-    probe.stream(motion(4.0))
+    # What a late joiner gets: both have passed, the second one governs. And one for later. They
+    # lie there together with the first samples when the node next looks.
+    record = motion(4.0)
+    probe.for_a_while(0.5)
+    with estimator.held():
+        probe.setup(stiffness=-1.0, index=0)
+        probe.setup(index=1000)
+        probe.index = 4000
+        probe.setup(stiffness=-1.0, index=9000)
+        probe.stream(record.slice(0, 100))
+        probe.for_a_while(0.5)
+    probe.stream(record.slice(100, len(record)))
     probe.until(lambda: probe.number('estimator', 'windows') >= 1, 30, 'a window')
     assert TOLD not in probe.faults['estimator']
 
