@@ -140,7 +140,7 @@ def test_what_was_not_tried_is_screened_beside_the_members(rng_seed: int) -> Non
         current = refits.add(current, name)
     found.renoise(refits.finished(current))
     current, most = refits.trial(current.effects), found.settings.tried
-    alone = refits.screened(current, set(refits.names) - set(current.effects))[:most]
+    alone = refits.promises.best(current, set(refits.names) - set(current.effects))[:most]
     tried = {t.added for t in found.overlooked(current)}
     assert len(tried) == most
     assert 'viscous-damping' in tried - set(alone)

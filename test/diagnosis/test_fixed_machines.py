@@ -10,6 +10,8 @@ import pytest
 from scipy.stats import binom
 
 ROOT = Path(__file__).parents[2]
+# Ten machines, one after the other, before the first of these tests.
+pytestmark = pytest.mark.timeout(1200)
 # Of `cases`, from the seeds for calibration: three healthy machines, six with a clear effect and
 # one with two.
 SEEDS = (900, 901, 920, 912, 915, 919, 930, 932, 933, 927)

@@ -86,7 +86,7 @@ def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
     theta = rng.choice(plants) * np.exp(0.1 * rng.standard_normal(4))
     refits, names = searched(sweeps(kind, size * (theta[2] if kind > 10 else 1.0), theta, rng))
     base = refits.trial(())
-    tried = {t.added: t for t in refits.additions(base, refits.screened(base, names)[:4])}
+    tried = {t.added: t for t in refits.additions(base, refits.promises.best(base, names)[:4])}
     best = tried[name]
     assert base.fit.rms > 1.1 * NOISE
     assert best.fit.rms < 1.05 * NOISE
@@ -124,7 +124,7 @@ def test_a_reading_that_settles_is_described(rng_seed: int) -> None:
         records.append(Record(record.command, measured, 1.0 / RATE, stiffness=record.stiffness))
     refits, names = searched(records)
     base = refits.trial(())
-    best = refits.additions(base, refits.screened(base, names)[:4])[0]
+    best = refits.additions(base, refits.promises.best(base, names)[:4])[0]
     assert best.added == 'learned-sensor-settling'
     assert best.fit.rms < 1.1 * NOISE
 
@@ -154,7 +154,7 @@ def test_a_resonance_is_described(kind: str, rng_seed: int) -> None:
     refits, names = searched(records)
     base = refits.trial(())
     assert base.fit.rms > 1.1 * NOISE
-    best = refits.additions(base, refits.screened(base, names)[:4])[0]
+    best = refits.additions(base, refits.promises.best(base, names)[:4])[0]
     assert best.added == 'learned-command-resonance'
     assert best.fit.rms < 1.05 * NOISE
     # The bilinear rule bends frequencies: by 0.7 % at 6 Hz.

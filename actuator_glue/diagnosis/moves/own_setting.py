@@ -117,7 +117,7 @@ def _fitted(
 ) -> Trial:
     structure = refits.structure(*start.effects, name)
     model = OneRecord(structure, name, records, (*refits.data.records, *held))
-    thetas = refits.screen(start, name)[1]
+    thetas = refits.promises.screen(start, name)[1]
     found = fit(refits.data, model, thetas)
     assert refits.scorer is not None
     return Trial(structure, name, found, refits.scorer.block_scores(found), model)

@@ -55,7 +55,7 @@ def _better(beam: BeamSearch, with_more: Trial, name: str, best: Trial) -> Trial
     """
     refits = beam.refits
     rest = refits.without(with_more, name)
-    names = refits.screened(rest, refits.others(with_more))[: beam.settings.tried]
+    names = refits.promises.best(rest, refits.others(with_more))[: beam.settings.tried]
     for trial in refits.additions(rest, names, below=with_more.mean_square):
         enough = beam.left(trial) < beam.material
         # Each of the two must matter beside the other.

@@ -163,7 +163,7 @@ def responses(refits: Refits, size: float) -> dict[str, Array]:
 
     def one(name: str) -> Array:
         alone = refits.structure(name)
-        starts, seen = refits.signature(name)
+        starts, seen = refits.promises.signature(name)
         neutral = alone.parameters[len(base)].neutral or 0.0
         nearest = int(np.argmin(np.abs(starts[:, 0] - neutral)))
         theta = np.concatenate([base, starts[nearest]])

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -17,7 +17,7 @@ from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
 from actuator_glue.diagnosis.refits.candidates import FEEDBACK
-from actuator_glue.diagnosis.refits.screening import Remainder, screen, signatures
+from actuator_glue.diagnosis.refits.promises import Promises
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
 from actuator_glue.diagnosis.trial import Trial
@@ -42,12 +42,7 @@ _PROMISING = 0.95  # of the error: friction that leaves less is searched for glo
 _POLISHED = 4
 _LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a reported structure, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
-_SCREENED = 30.0  # s of stretches on which signatures are seen
 _LONG = 5.0  # times their stretches: for longer data these tell which minimum is the lowest
-
-
-# By effect, and whether it was beside the present ones: see `Refits.screen`.
-Screens: TypeAlias = dict[tuple[str, bool], tuple[float, Array]]
 
 
 def by_score(trial: Trial) -> float:
@@ -109,10 +104,8 @@ class Refits:
     described: bool = False
     effort: Effort = field(default_factory=Effort)
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
-    _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
-    _screened: WeakKeyDictionary[Fit, Screens] = field(default_factory=WeakKeyDictionary)
-    _remainders: dict[bool, tuple[Fit, Remainder]] = field(default_factory=dict)
+    _promises: Promises | None = None
     _polished: dict[frozenset[str], int] = field(default_factory=dict)
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
@@ -121,6 +114,14 @@ class Refits:
         if frozenset() not in self._tried:
             self._tried[frozenset()] = self.effort.spent_on(base_fit(self.data))
         return self._tried[frozenset()]
+
+    @property
+    def promises(self) -> Promises:
+        """What effects promise, once the base is fitted."""
+        if self._promises is None:
+            base = self._tried[frozenset()]
+            self._promises = Promises(self.data, base, self.entries, self.each)
+        return self._promises
 
     def scale(self) -> Scale:
         """Sizes of this test at the fitted base."""
@@ -162,7 +163,9 @@ class Refits:
     def wider(self, names: Sequence[str]) -> Refits:
         """Return a copy that tries further effects; it knows all structures refitted so far."""
         own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
-        return replace(self, names=(*self.names, *names), entries=dict(self.entries), **own)
+        entries = dict(self.entries)
+        own['_promises'] = self.promises.of(entries)
+        return replace(self, names=(*self.names, *names), entries=entries, **own)
 
     def take_over(
         self, other: Refits, final: Trial, singles: Sequence[Trial], matters: float
@@ -177,7 +180,7 @@ class Refits:
             matters: least rms error that matters [m].
         """
         self.names, self.entries = other.names, dict(other.entries)
-        self.described = other.described
+        self.described, self._promises = other.described, None
         most = final.mean_square + matters**2
         near = {key for key, known in other._tried.items() if known.rms**2 < most}
         near |= {frozenset(final.effects) - {n} for n in final.effects} & other._tried.keys()
@@ -207,12 +210,12 @@ class Refits:
         key = frozenset(model.effects)
         near = self.effort.earlier.ended.get(key)
         if key not in self._tried and near is not None:
-            starts = np.stack([near, self.screen(current, name)[1][0]])
+            starts = np.stack([near, self.promises.screen(current, name)[1][0]])
             start = self._lowest(starts, model.effects)
             found = self._fit(self.data, model, start, iterations=_COARSE, tolerance=_TOLERANCE)
             self._keep(key, found)
         elif key not in self._tried:
-            starts, part = self.screen(current, name)[1], self._stand_in(model)
+            starts, part = self.promises.screen(current, name)[1], self._stand_in(model)
             starts, steps = (starts[:1], 1) if briefly else (starts, _COARSE)
             found = self._fit(part.data, model, starts, iterations=steps, tolerance=_TOLERANCE)
             friction = self.entries[name].group == 'friction' and not (current.effects or briefly)
@@ -283,85 +286,11 @@ class Refits:
 
     @cached_property
     def _whole(self) -> Part:
-        return Part(self.data, slice(None), tuple(range(len(self.data.records))))
+        return Part.whole(self.data)
 
     @cached_property
     def _stretches(self) -> Part:
         return stretches(self.data) or self._whole
-
-    def _seen_on(self, name: str) -> Part:
-        """Return the data on which an effect's signatures are seen."""
-        return self._whole if self.entries[name].record_time else self._glances
-
-    @cached_property
-    def _glances(self) -> Part:
-        return stretches(self.data, _SCREENED) or self._whole
-
-    def signature(self, name: str) -> tuple[Array, Array]:
-        """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
-        if name not in self._signatures:
-            alone, base = self.structure(name), self._tried[frozenset()].theta
-            thetas = alone.starts(base, self.scale())
-            seen = signatures(self._seen_on(name).data, alone, thetas, base)
-            self._signatures[name] = thetas[:, alone.columns(name)], seen
-        return self._signatures[name]
-
-    def signatures(self) -> tuple[Array, Array, Scorer]:
-        """Every effect's signatures at all its starting sizes (s, M) [m].
-
-        And what they are seen against: the Jacobian of Eq. (2) (4, M), and the noise.
-        """
-        assert self.scorer is not None
-        part, rows = self._glances, []
-        for name in self.names:
-            own, seen = self._seen_on(name), self.signature(name)[1]
-            rows.append(seen if own is part else seen[:, part.rows])
-        every = np.concatenate(rows)
-        jacobian = self._tried[frozenset()].jacobian_of(part.rows)
-        # A metre of response: it diverged.
-        alive = np.nan_to_num(np.abs(every), nan=np.inf).max(axis=1) < 1.0
-        return every[alive], jacobian, self.scorer.of_part(part)
-
-    def screen(self, current: Trial, name: str, *, beside: bool = False) -> tuple[float, Array]:
-        """Project the residual on an effect's signatures (see diagnosis/refits/screening.py).
-
-        They are those with Eq. (2) alone, or `beside` the effects of the present structure.
-
-        Returns:
-            The largest share of the squared error that one of the effect's starting sizes can
-            remove, and the starting parameters that promise most (s, p).
-        """
-        known = self._screened.setdefault(current.fit, {})
-        if (name, beside) not in known:
-            known[name, beside] = self._screen(current, name, beside)
-        return known[name, beside]
-
-    def _screen(self, current: Trial, name: str, beside: bool) -> tuple[float, Array]:
-        model = self.structure(*current.effects, name)
-        part, fit = self._seen_on(name), current.fit
-        sizes, seen = self.signature(name)
-        new = np.zeros(len(model.parameters), dtype=np.bool_)
-        new[model.columns(name)] = True
-
-        def with_others(own: Array) -> Array:
-            thetas = np.empty((len(own), len(new)))
-            thetas[:, new], thetas[:, ~new] = own, fit.theta
-            return thetas
-
-        if beside:
-            simulated = part.data.target - fit.error[part.rows]
-            seen = part.data.simulate(model, with_others(sizes)) - simulated
-        left = self._remainder(fit, part)
-        share, best = screen(self.entries[name].parameters, sizes, seen, left)
-        return share, with_others(best)
-
-    def _remainder(self, fit: Fit, part: Part) -> Remainder:
-        """What a fit's parameters leave of its error; that of the last fit is kept."""
-        known = self._remainders.get(part is self._whole)
-        if known is None or known[0] is not fit:
-            left = Remainder.of(fit.error[part.rows], fit.jacobian_of(part.rows))
-            self._remainders[part is self._whole] = known = fit, left
-        return known[1]
 
     def additions(
         self,
@@ -423,18 +352,6 @@ class Refits:
         known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
         return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
 
-    def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
-        """Return the share of the squared error that an effect's signatures promise to remove.
-
-        Where those with Eq. (2) alone promise less than `least`, the larger one of theirs and of
-        those beside the present effects: given a delay, a damper removed half of what was left,
-        and two thousandths were promised.
-        """
-        share = self.screen(current, name)[0]
-        if share < least and current.effects:
-            share = max(share, self.screen(current, name, beside=True)[0])
-        return share
-
     def _wanted(self, asked: Asked) -> list[tuple[Trial, str, bool]]:
         """Return what is refitted: the structure, a further effect, whether briefly.
 
@@ -444,10 +361,10 @@ class Refits:
         """
         current = asked.current
         names = [n for n in asked.names if n not in current.effects]
-        shares = list(self.each(lambda n: self._promise(current, n), names))
+        shares = list(self.each(lambda n: self.promises.share(current, n), names))
         use = max(0.0, 1.0 - asked.below / current.mean_square)
         least = max([use, *shares]) / UNDERSTATED
-        shares = list(self.each(lambda n: self._promise(current, n, least), names))
+        shares = list(self.each(lambda n: self.promises.share(current, n, least), names))
         if max(shares, default=0.0) < least and self._structure(current.fit) > UNDERSTATED * use:
             least = 0.0
         far = {n for n, s in zip(names, shares, strict=True) if s < least and n != FEEDBACK}
@@ -456,22 +373,6 @@ class Refits:
     def _structure(self, fit: Fit) -> float:
         """Return the share of a fit's squared error that is no noise."""
         return (pooled(self.data, splits_of(self.data, fit.error))[0] / fit.rms) ** 2
-
-    def promised(
-        self, current: Trial, names: Iterable[str], *, beside: bool = False
-    ) -> list[tuple[str, float]]:
-        """Sort effects by the mean squared error that their signatures promise to leave [m^2].
-
-        Those with Eq. (2) alone, or `beside` the present effects, which takes as long as refits.
-        """
-        wanted = list(names)
-        shares = list(self.each(lambda n: self.screen(current, n, beside=beside)[0], wanted))
-        left = [(n, (1.0 - s) * current.mean_square) for n, s in zip(wanted, shares, strict=True)]
-        return sorted(left, key=lambda pair: pair[1])
-
-    def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
-        """Sort effects by what their signatures promise, as `promised`."""
-        return [name for name, _ in self.promised(current, names, beside=beside)]
 
     def without_each(self, current: Trial) -> list[Trial]:
         """Refit a structure with each of its effects taken away, in their order, as `without`."""

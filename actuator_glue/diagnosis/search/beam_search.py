@@ -64,7 +64,7 @@ class BeamSearch(Judge):
         self.progress(label, 0.0)
         asked = []
         for current in beam:
-            names = self.refits.screened(current, self.refits.others(current))
+            names = self.refits.promises.best(current, self.refits.others(current))
             names = names[: self.settings.tried]
             if stage > NAMES_FIRST:
                 names += self.promising_terms(current)
@@ -99,7 +99,7 @@ class BeamSearch(Judge):
         if sum(map(is_learned, current.structure.entries)) >= MOST_TERMS:
             return ()
         names = [n for n in self.refits.terms() if n not in current.effects]
-        promised = self.refits.promised(current, names)
+        promised = self.refits.promises.left(current, names)
         best = [n for n, left in promised if left < PROMISED * below][: self.settings.terms]
         held = (self.refits.entries[n].holds for n in best)
         plainer = [h[0] for h in held if h is not None and h[0] not in current.effects]
@@ -116,7 +116,7 @@ class BeamSearch(Judge):
 
     def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
         """Return the effects that promise most beside the present ones."""
-        return self.refits.screened(current, names, beside=True)[: self.settings.tried]
+        return self.refits.promises.best(current, names, beside=True)[: self.settings.tried]
 
     def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
         """Refit a structure roughly with each further effect; finish those that may matter."""
@@ -128,7 +128,7 @@ class BeamSearch(Judge):
         self.renoise()
         base = self.refits.trial(())
         below = base.mean_square - (SEEN * self.material) ** 2
-        promised = self.refits.promised(base, self.refits.names)
+        promised = self.refits.promises.left(base, self.refits.names)
         self.refits.effort.expects(any(left < below for _, left in promised))
         tell = partial(self.progress, 'effect 1')
         singles = self.refits.additions(base, None, tell, below=below)
@@ -156,8 +156,11 @@ class BeamSearch(Judge):
         return self._grown(current, self.rescored(found.singles), (), ())
 
     def _set_nats(self) -> None:
-        found = self.refits.signatures()
-        self.nats = false_alarms.threshold(*found, self.settings.false_alarms)
+        scorer = self.refits.scorer
+        assert scorer is not None
+        seen, jacobian, part = self.refits.promises.signatures(self.refits.names)
+        noise = scorer.of_part(part)
+        self.nats = false_alarms.threshold(seen, jacobian, noise, self.settings.false_alarms)
 
     def _grown(
         self,
@@ -337,7 +340,7 @@ class BeamSearch(Judge):
         for rest in rests:
             names = refits.others(current)
             if len(current.effects) > 1:
-                names = refits.screened(rest, names)[:most]
+                names = refits.promises.best(rest, names)[:most]
             below = gains.left_by_rivals(rest, current)
             asked.append(Asked(rest, tuple(names), below))
         singles = refits.additions_to(asked)

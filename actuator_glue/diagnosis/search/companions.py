@@ -84,7 +84,7 @@ def beside(beam: BeamSearch, current: Trial, names: Sequence[str], least: float)
         least: error that an effect must remove [m]; those that remove less are refitted roughly.
     """
     refits = beam.refits
-    ranked = refits.screened(current, names)[: beam.settings.tried]
+    ranked = refits.promises.best(current, names)[: beam.settings.tried]
     below = current.mean_square - least**2
     return refits.additions(current, ranked, valves=False, below=below)
 

@@ -143,7 +143,7 @@ def _unseen(refits: Refits, found: Selection, settings: Thresholds) -> tuple[str
 
     def added(name: str) -> Trial:
         structure = refits.structure(*final.effects, name)
-        starts = refits.screen(final, name)[1]
+        starts = refits.promises.screen(final, name)[1].copy()
         starts[:, [p in final.structure.parameters for p in structure.parameters]] = without.theta
         rough = fit(both, structure, starts, iterations=_COARSE)
         return Trial(structure, name, rough, final.scores)

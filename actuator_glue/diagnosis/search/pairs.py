@@ -88,7 +88,7 @@ def screened(
     ]
 
     def left(pair: tuple[Trial, str]) -> float:
-        return (1.0 - refits.screen(*pair, beside=True)[0]) * pair[0].mean_square
+        return (1.0 - refits.promises.screen(*pair, beside=True)[0]) * pair[0].mean_square
 
     errors = list(refits.each(left, wanted))
     best: dict[frozenset[str], tuple[Trial, str]] = {}

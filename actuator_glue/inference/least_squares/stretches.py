@@ -33,6 +33,11 @@ class Part:
     rows: NDArray[np.intp] | slice
     records: tuple[int, ...]
 
+    @classmethod
+    def whole(cls, data: Data) -> Part:
+        """Return all of some data."""
+        return cls(data, slice(None), tuple(range(len(data.records))))
+
 
 def stretches(data: Data, most: float = _TOTAL) -> Part | None:
     """Return stretches that stand for long records; None where the records are not long.
