@@ -200,6 +200,7 @@ def _by_name(
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
     if table.period is not None:
         needed = tuple(role for role in needed if role != 'time')
+    _refuse_unread(path, table, {*needed, 'force'})
     columns, motion = choose(labels, units, str(path), needed)
     raw = table.values([at for at, _ in columns.values()])
     _check_numbers(raw, {role: at for role, (at, _) in columns.items()}, table, path)
@@ -213,6 +214,18 @@ def _by_name(
         _check_period(period, values['time'], path)
     del raw, table  # a long file's columns as they were read are not held beside these
     return values, notes, None if 'time' in values else period, start_ns, motion
+
+
+def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
+    """Refuse a file whose only column for a role holds no numbers: it would be left out unseen."""
+    found = {role for c in table.columns for role, _ in [recognise(c.label) or ('', '')]}
+    for label, kind in table.unread.items():
+        role, _ = recognise(label) or ('', '')
+        if role in roles - found:
+            raise InputError(
+                f'{path}: column {label!r} holds {kind} and no real numbers; save it as such, or '
+                f'give it another name if it is not {role}'
+            )
 
 
 def _mapped(

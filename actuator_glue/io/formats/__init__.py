@@ -9,7 +9,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from actuator_glue.records import Array
 
 # Bytes of numbers that one file may hold: a day and a half at 1 kHz with two channels.
 LARGEST = 2 << 30
+# Values that are no numbers: so few are a remark, and no column.
+A_REMARK = 20
 # Columns that one file may have; a matrix with more is no list of channels.
 MOST_COLUMNS = 10_000
 
@@ -53,6 +55,7 @@ class FileTable:
         start_ns: time from which its times count [ns], where the file states one; 0 elsewhere.
         entry: where a sample, from 0, of a column at a position is, and what is written there,
             for messages; None in files that no person reads.
+        unread: columns that are no numbers, by their label, and what they hold.
     """
 
     columns: list[Column]
@@ -61,6 +64,7 @@ class FileTable:
     period: float | None = None
     start_ns: int = 0
     entry: Callable[[int, int], str] | None = None
+    unread: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

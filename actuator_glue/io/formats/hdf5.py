@@ -13,6 +13,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.file_notes import NOTES, nearly
 from actuator_glue.io.formats import (
+    A_REMARK,
     MOST_COLUMNS,
     Column,
     FileTable,
@@ -70,7 +71,8 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
         file.visititems(tree.visit)
     if not tree.columns and not matlab:
         raise InputError(f'{path}: no numeric vector or matrix in this file')
-    return FileTable(named_by_structs(tree.columns, tree.texts), tree.notes, values)
+    columns = named_by_structs(tree.columns, tree.texts)
+    return FileTable(columns, tree.notes, values, unread=tree.unread)
 
 
 def has_objects(path: Path) -> bool:
@@ -99,6 +101,7 @@ class _Tree:
         places: dataset of each column, and which column or field of that.
         notes: what the file says besides.
         texts: small texts by their names in full.
+        unread: columns of what is no number, by their label, and what they hold.
     """
 
     def __init__(self, matlab: bool) -> None:
@@ -107,6 +110,7 @@ class _Tree:
         self.places: list[tuple[str, str | int]] = []
         self.notes: dict[str, str] = {}
         self.texts: dict[str, str] = {}
+        self.unread: dict[str, str] = {}
         self._seen = 0
 
     def visit(self, name: str, found: Any) -> None:
@@ -128,6 +132,8 @@ class _Tree:
             if few and _CLASS not in dataset.attrs:  # cells are left alone
                 self._take_structs(dataset, shown, depth + 1)
         elif fields and dataset.ndim == 1:  # a table: one column per field
+            kinds = {f: dataset.dtype[f] for f in fields}
+            self.unread |= {f: _kind(k) for f, k in kinds.items() if k.kind not in 'fiu'}
             fields = [f for f in fields if dataset.dtype[f].kind in 'fiu']
             self.columns += [Column(f'{shown}.{f}', f) for f in fields]
             self.places += [(place, f) for f in fields]
@@ -136,6 +142,8 @@ class _Tree:
             found = matrix_columns(shown, shape, _unit(dataset))
             self.columns += found
             self.places += [(place, i) for i in range(len(found))]
+        elif dataset.size > A_REMARK and (fields or _CLASS not in dataset.attrs):
+            self.unread[shown.replace('/', '.').rpartition('.')[2]] = _kind(dataset.dtype)
 
     def _note(self, dataset: Any, shown: str) -> None:
         label = shown.replace('/', '.').rpartition('.')[2]
@@ -160,6 +168,13 @@ class _Tree:
                 continue
             for name, within in _datasets(target):
                 self._take(within.name, within, f'{called}.{name}', depth)
+
+
+def _kind(dtype: np.dtype[Any]) -> str:
+    """Return what is held that is no number, in words."""
+    if dtype.kind in 'SUO':
+        return 'text'
+    return 'complex numbers' if dtype.kind == 'c' or 'imag' in (dtype.names or ()) else str(dtype)
 
 
 def _datasets(group: Any) -> list[tuple[str, Any]]:

@@ -64,7 +64,7 @@ def _collect(name: str, value: Any, arrays: dict[str, Any], texts: dict[str, str
                 _collect(f'{name}({i})', entry, arrays, texts)
     else:
         array = np.atleast_1d(np.asarray(value))
-        if array.dtype.kind in 'fiu' and array.ndim <= 2:
+        if array.dtype.kind in 'fiuc' and array.ndim <= 2:
             arrays[name] = array
 
 
@@ -77,6 +77,10 @@ def _plain(content: dict[str, Any]) -> FileTable:
             _collect(name, value, arrays, texts)
     columns: list[Column] = []
     places: list[tuple[str, int]] = []
+    unread = {}
+    for name in [name for name, array in arrays.items() if array.dtype.kind == 'c']:
+        del arrays[name]
+        unread[name.rpartition('.')[2]] = 'complex numbers'
     for name, array in arrays.items():
         found = matrix_columns(name, array.shape)
         columns += found
@@ -91,7 +95,7 @@ def _plain(content: dict[str, Any]) -> FileTable:
         chosen = [places[at] for at in wanted]
         return [matrix_column(arrays[n], i).astype(np.float64, copy=False) for n, i in chosen]
 
-    return FileTable(named_by_structs(columns, texts), notes, values)
+    return FileTable(named_by_structs(columns, texts), notes, values, unread=unread)
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
@@ -124,7 +128,7 @@ def _with_objects(path: Path, table: FileTable) -> FileTable:
         plain = iter(table.values([at for at in wanted if at < count]))
         return [next(plain) if at < count else found[at - count].values for at in wanted]
 
-    return FileTable([*table.columns, *labelled], table.notes, values)
+    return FileTable([*table.columns, *labelled], table.notes, values, unread=table.unread)
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:

@@ -48,7 +48,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             table = file.read(columns=names, use_threads=False)
             return [_numbers(table.column(name)) for name in names]
 
-    return FileTable([_column(f) for f in fields], notes, values)
+    unread = {f.name: str(f.type) for f in schema if not _is_number(f.type)}
+    # A column of nothing has no type.
+    unread = {name: kind for name, kind in unread.items() if kind != 'null'}
+    return FileTable([_column(f) for f in fields], notes, values, unread=unread)
 
 
 def _is_number(kind: Any) -> bool:

@@ -12,7 +12,15 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import Column, FileTable, Format, check_size, library, reading
+from actuator_glue.io.formats import (
+    A_REMARK,
+    Column,
+    FileTable,
+    Format,
+    check_size,
+    library,
+    reading,
+)
 from actuator_glue.io.units import bare, recognise
 from actuator_glue.records import Array, same_period
 
@@ -52,12 +60,15 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     columns: list[Column] = []
     clocks: list[_Clock] = []
     broken: list[str] = []
+    unread: dict[str, str] = {}
     stamps: set[int] = set()
     with reading(path, _NAME), tdms.open(path) as file:
         notes = {str(name): str(value) for name, value in file.properties.items()}
         for group in file.groups():
             for channel in group.channels():
                 if channel.data_type is None or not _is_number(channel):
+                    if channel.data_type is not None and len(channel) > A_REMARK:
+                        unread[channel.name] = channel.data_type.__name__
                     continue
                 # A value takes at least a byte of the file: a channel claiming more is damaged.
                 if len(channel) > size:
@@ -90,7 +101,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             read = [_values(found[columns[at].name], path) for at in wanted]
         return [column[cuts.get(at, slice(None))] for at, column in zip(wanted, read, strict=True)]
 
-    return FileTable(columns, notes, values, period, start_ns)
+    return FileTable(columns, notes, values, period, start_ns, unread=unread)
 
 
 def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
