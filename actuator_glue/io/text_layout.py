@@ -19,6 +19,7 @@ from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import units_line
 
 _LOOK = 300  # lines in which the samples must begin
+_ABOVE = 6  # lines above the samples in which their names and units are
 _ROWS = 5  # rows of one shape that are samples
 
 
@@ -76,11 +77,11 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
     A line of units above a block belongs to it: the reader finds such a line by itself.
     """
     found: list[SampleRows] = []
-    above: list[list[str]] = []
+    above: list[tuple[int, list[str]]] = []
     first, rows, empty, follows = 0, 0, 0, False
     with open_text(path, errors='replace') as file:
         for at, line in enumerate(file):
-            if at < like.first - 2:
+            if at < like.first - _ABOVE:
                 continue
             entries = fields_of(line.rstrip('\r\n'), like.delimiter)
             if not any(entries):
@@ -88,8 +89,8 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
                 continue
             if at >= like.first and _is_row(entries, like.numbers):
                 if not rows:
-                    units = len(above) == 2 and len(above[0]) >= 2 and bool(units_line(above[1]))
-                    first = at - units
+                    names = _names_above(above)
+                    first = at if names is None else names + 1
                 rows += 1 + (empty if rows else 0)
                 empty = 0
                 continue
@@ -97,10 +98,24 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
                 found.append(SampleRows(first, rows))
                 rows, follows, above = 0, True, []
             empty = 0
-            above = [*above[-1:], fields_of(uncommented(line.rstrip('\r\n')), like.delimiter)]
+            text = uncommented(line.rstrip('\r\n'))
+            above = [*above[-1:], (at, fields_of(text, like.delimiter))]
     if rows:
         found.append(SampleRows(first, rows))
     return found, follows
+
+
+def _names_above(above: list[tuple[int, list[str]]]) -> int | None:
+    """Return which line names the columns: the last one above the samples, or above their units.
+
+    Args:
+        above: the last two lines above the samples that are not empty, with their positions.
+    """
+    if len(above) == 2 and units_line(above[1][1]):
+        (upper, names), (lower, units) = above
+        if len(names) >= 2 and (lower == upper + 1 or len(names) == len(units)):
+            return upper
+    return above[-1][0] if above else None
 
 
 def _is_row(entries: list[str], numbers: list[int]) -> bool:

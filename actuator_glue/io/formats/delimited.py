@@ -23,6 +23,7 @@ from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows read or written at a time
 _LOOK = 100  # rows that tell how a text is laid out
+_BROKEN = 10  # lines over which the names may go on: spreadsheets break lines within cells
 # A comma may be the decimal sign where there is another delimiter, so it comes behind the usual
 # ones.
 DELIMITERS = (';', '\t', ',', '|')
@@ -122,11 +123,17 @@ def read_head(
     elif len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
     else:
-        line = uncommented(top[header_lines - 1]) if header_lines else ''
-    if line and not units and len(top) > header_lines:
-        below = uncommented(top[header_lines])
-        units = units_line(fields_of(below, delimiter or _of_units(line, below)))
-        header_lines += bool(units)
+        first = _opened(top, header_lines - 1)
+        line = uncommented(' '.join(top[first:header_lines])) if header_lines else ''
+    below = header_lines
+    while line and not units and below < len(top):
+        text, below = uncommented(top[below]), below + 1
+        units = units_line(fields_of(text, delimiter or _of_units(line, text)))
+        if units or _COMMENT.match(top[below - 1]):
+            _take_note(text, notes, path)
+            header_lines = below
+        elif text.strip(_NOTHING):
+            break
     rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
     if delimiter is None:
         delimiter = _best_delimiter(line, rows[0])
@@ -157,16 +164,9 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
     """
     notes: dict[str, str] = {}
     comments, at = [''], first
-    while at < len(top) and _COMMENT.match(top[at]):
+    while at < len(top) and (_COMMENT.match(top[at]) or not top[at].strip(_NOTHING)):
         comment = uncommented(top[at])
-        name, sign, value = comment.partition('=')
-        before, colon, behind = comment.partition(':')
-        # One nearly right is refused as with `=`; `Stiffness: see drawing` is prose.
-        if colon and states(before, behind):
-            name, sign, value = before if note_of(before) else f'{before.strip()}:', colon, behind
-        if sign:
-            add_note(notes, name.strip(), value.strip(), str(path))
-        else:
+        if comment.strip() and not _take_note(comment, notes, path):
             comments.append(comment)
         at += 1
     line = '\n'.join(comments[-2:])
@@ -174,7 +174,9 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
         return at, line, notes
     entries = fields_of(top[at], _best_delimiter('', top[at]))
     if len(entries) < 2 or not all(map(is_number, entries)):
-        return at + 1, top[at], notes
+        ends = range(at + 1, min(at + _BROKEN, len(top)) + 1)
+        stop = next((end for end in ends if _closed(top[at:end])), at + 1)
+        return stop, ' '.join(top[at:stop]), notes
     if entries in ([str(i + start) for i in range(len(entries))] for start in (0, 1)):
         raise InputError(
             f'{path}: line {at + 1} may be a sample or the numbers of the columns; say which in '
@@ -182,6 +184,29 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
         )
     # Numbers are no names but the first sample; numpy.savetxt puts names behind a `#`.
     return at, line, notes
+
+
+def _opened(top: list[str], last: int) -> int:
+    """Return the line in which a name begins that ends in line `last`: quoted, with line ends."""
+    firsts = range(last, max(last - _BROKEN, -1), -1)
+    return next((first for first in firsts if _closed(top[first : last + 1])), last)
+
+
+def _closed(lines: list[str]) -> bool:
+    """Whether every quote that begins in some lines ends there."""
+    return sum(line.count('"') for line in lines) % 2 == 0
+
+
+def _take_note(comment: str, notes: dict[str, str], path: Path) -> bool:
+    """Add what a comment states to the notes; return whether it states anything."""
+    name, sign, value = comment.partition('=')
+    before, colon, behind = comment.partition(':')
+    # One nearly right is refused as with `=`; `Stiffness: see drawing` is prose.
+    if colon and states(before, behind):
+        name, sign, value = before if note_of(before) else f'{before.strip()}:', colon, behind
+    if sign:
+        add_note(notes, name.strip(), value.strip(), str(path))
+    return bool(sign)
 
 
 def _commented_units(line: str) -> tuple[str, list[str]]:

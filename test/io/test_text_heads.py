@@ -1,0 +1,79 @@
+"""Lines about the names of columns, and the end of a text: nothing is taken for something else."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.cli.main import main
+from actuator_glue.errors import InputError
+from actuator_glue.io.laboratory import read
+
+_COUNT = 400
+_TIME = np.arange(_COUNT) / 500.0
+_COMMAND = np.round(7.0 * np.sin(20.0 * _TIME), 4)
+_MEASURED = np.round(6.9 * np.sin(20.0 * (_TIME - 0.015)), 4)
+_FORCE = np.round(250.0 * np.sin(20.0 * (_TIME - 0.015)), 4)
+_COLUMNS = (_TIME, _COMMAND, _MEASURED, _FORCE)
+_NAMES = 'time_s,command_mm,measured_mm,force_N'
+_BARE, _UNITS = 'time,command,measured,force', 's,mm,mm,N'
+_BROKEN = 'time_s,"command\n[mm]","measured\n[mm]","force\n[N]"'
+
+
+def _write(path: Path, head: str, end: str = '\n', form: str = '{:.4f}') -> Path:
+    rows = [','.join(map(form.format, row)) for row in zip(*_COLUMNS, strict=True)]
+    path.write_text('\n'.join([*([head] if head else []), *rows]) + end, encoding='utf-8')
+    return path
+
+
+def _check(path: Path, **options) -> None:
+    record = read(path, **options)
+    np.testing.assert_allclose(record.command, 1e-3 * _COMMAND, atol=1e-9)
+    np.testing.assert_allclose(record.measured, 1e-3 * _MEASURED, atol=1e-9)
+    np.testing.assert_allclose(record.force, _FORCE, atol=1e-9)
+    assert record.rate == 500.0
+
+
+@pytest.mark.parametrize(
+    'head',
+    [
+        f'\n{_NAMES}',
+        f'# a test\n\n{_NAMES}',
+        f'{_NAMES}\n# marker: none',
+        f'{_NAMES}\n\n# 400 samples\n',
+        f'{_BARE}\n\n{_UNITS}',
+        f'{_BARE}\n# as saved\n{_UNITS}\n',
+        _BROKEN,
+        f'# a test\n{_BROKEN}\n',
+    ],
+)
+def test_lines_about_the_names_are_stepped_over(head: str, tmp_path: Path) -> None:
+    _check(_write(tmp_path / 'a.csv', head))
+
+
+def test_a_note_below_the_names_counts(tmp_path: Path) -> None:
+    path = _write(tmp_path / 'a.csv', f'{_NAMES}\n# stiffness_N_per_m = 250e3')
+    assert read(path).stiffness == 250e3
+    path = _write(tmp_path / 'b.csv', f'{_NAMES}\n# stiffness = 250e3')
+    with pytest.raises(InputError, match='is not understood'):
+        read(path)
+
+
+def test_a_sign_of_inches_opens_no_quote(tmp_path: Path) -> None:
+    _check(_write(tmp_path / 'a.csv', f'{_NAMES},remark 5"'))
+
+
+@pytest.mark.parametrize(
+    'head',
+    [
+        'Channels: 4\nlength;x\nTime [s],Command [mm],Position [mm],Load [N]\n',
+        'Logger 3\nTime,Command,Position,Load\n[s],[mm],[mm],[N]\n\n',
+        'Logger 3\nTime,Command,Position,Load\n\n[s],[mm],[mm],[N]\n',
+        'Logger 3\nTime [s],"Command\n[mm]","Position\n[mm]","Load\n[N]"',
+    ],
+)
+def test_a_map_finds_the_names_above_empty_lines(head: str, tmp_path: Path) -> None:
+    path, out = _write(tmp_path / 'a.txt', head), tmp_path / 'map.yaml'
+    assert main(['map', str(path), '--out', str(out)]) == 0
+    assert 'CHECK unit' not in out.read_text()
+    _check(path, channels=out)
