@@ -77,3 +77,19 @@ def test_a_map_finds_the_names_above_empty_lines(head: str, tmp_path: Path) -> N
     assert main(['map', str(path), '--out', str(out)]) == 0
     assert 'CHECK unit' not in out.read_text()
     _check(path, channels=out)
+
+
+@pytest.mark.parametrize('digits', [1, 3, 4, 5])
+@pytest.mark.parametrize('form', ['{:.4f}', '{:.9e}'])
+def test_a_text_that_ends_within_a_number_is_refused(
+    form: str, digits: int, tmp_path: Path
+) -> None:
+    path = _write(tmp_path / 'a.csv', _NAMES, '', form)
+    path.write_text(path.read_text()[:-digits])
+    with pytest.raises(InputError, match=f'cut off within its last number.*line {_COUNT + 1} '):
+        read(path)
+
+
+@pytest.mark.parametrize('form', ['{:.4f}', '{:.9e}', '{:.7g}', '{}'])
+def test_a_text_may_end_without_a_line_end(form: str, tmp_path: Path) -> None:
+    _check(_write(tmp_path / 'a.csv', _NAMES, '', form))

@@ -23,6 +23,7 @@ from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows read or written at a time
 _LOOK = 100  # rows that tell how a text is laid out
+_ENDS = 200  # last rows that tell whether a text was cut off within its last number
 _BROKEN = 10  # lines over which the names may go on: spreadsheets break lines within cells
 # A comma may be the decimal sign where there is another delimiter, so it comes behind the usual
 # ones.
@@ -378,16 +379,19 @@ def read_columns(path: Path, head: TextHead, positions: list[int]) -> list[Array
             f'{max(positions) + 1} is asked for'
         )
     parts: list[list[Array]] = [[] for _ in positions]
+    last: list[tuple[int, str]] = []
     try:
         with open_text(path) as file:
             rows = _rows(file, head)
             while block := list(islice(rows, _ROWS)):
+                last = [*last, *block][-_ENDS:]
                 for part, column in zip(parts, _block(path, block, head, positions), strict=True):
                     part.append(column)
     except UnicodeDecodeError as error:
         raise InputError(
             f'{path}: not plain text in {error.encoding} (byte {error.start}); save it as UTF-8'
         ) from error
+    _refuse_cut(path, head, last)
     if not parts[0]:
         raise InputError(f'{path}: no samples after the {head.lines} header lines')
     columns = []
@@ -400,6 +404,31 @@ def read_columns(path: Path, head: TextHead, positions: list[int]) -> list[Array
             f'channel map says `rows: {head.rows}`'
         )
     return columns
+
+
+def _refuse_cut(path: Path, head: TextHead, rows: list[tuple[int, str]]) -> None:
+    """Refuse a text that ends within its last number: a digit may be missing, or an exponent.
+
+    It has no line end there, and the number fewer digits behind its decimal sign than all before.
+
+    Args:
+        path: the file.
+        head: its head.
+        rows: the last ones of the samples, with their numbers.
+
+    Raises:
+        InputError: it does.
+    """
+    if len(rows) < _ENDS or rows[-1][1].endswith('\n'):
+        return
+    entries = [(fields_of(line, head.delimiter) or [''])[-1] for _, line in rows]
+    *usual, found = [len(entry.partition(head.decimal)[2]) for entry in entries]
+    if len(set(usual)) == 1 and found < usual[0]:
+        raise InputError(
+            f'{path}: the file is cut off within its last number, {entries[-1]!r} in line '
+            f'{rows[-1][0]} (those before it have {usual[0]} characters behind the decimal sign, '
+            'and a line end); copy it anew, or remove that line'
+        )
 
 
 def _rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
