@@ -42,6 +42,7 @@ class Channels:
         hold: how the command runs between its samples; None where nothing says it.
         actuator: its name.
         motion: what command and measured are in: metres, or another motion.
+        told: what a reader should know of what was taken, a line each.
     """
 
     values: dict[str, Array]
@@ -51,6 +52,7 @@ class Channels:
     hold: str | None
     actuator: str
     motion: str
+    told: tuple[str, ...]
 
 
 def read(
@@ -76,13 +78,16 @@ def read(
             uneven clock is refused. The record's source tells it, and its command runs straight
             between samples where nothing else is given. Band-limited; `(27.0, 'lines')` draws
             straight lines between samples.
-        warn: called with a line that tells what resampling cost, or that an even clock was left.
+        warn: called with a line that tells what resampling cost, that an even clock was left, or
+            what was taken where the file leaves a choice.
 
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
     """
     way = None if resample is None else rate_and_way(resample)
     found = channels_of(path, channels)
+    for line in found.told:
+        warn(f'{path}: {line}')
     values, period = found.values, found.period
     said_hold = found.hold
     first = float(values['time'][0]) if 'time' in values else 0.0
@@ -148,7 +153,7 @@ def channels_of(
         raise InputError(f'{path}: this is a folder, and no bag in MCAP format')
     channels = channel_map_given(channels)
     if channels is not None:
-        values, period, start_ns = _mapped(path, channels, needed)
+        values, period, start_ns, told = _mapped(path, channels, needed)
         _refuse_empty(path, values)
         return Channels(
             values,
@@ -158,8 +163,9 @@ def channels_of(
             channels.hold,
             channels.actuator,
             channels.motion,
+            told,
         )
-    values, notes, period, start_ns, motion = _by_name(path, needed)
+    values, notes, period, start_ns, motion, told = _by_name(path, needed)
     _refuse_empty(path, values)
     return Channels(
         values,
@@ -169,6 +175,7 @@ def channels_of(
         notes.get('hold'),
         notes.get('actuator', 'actuator'),
         motion,
+        told,
     )
 
 
@@ -191,8 +198,8 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
 
 def _by_name(
     path: Path, needed: tuple[str, ...]
-) -> tuple[dict[str, Array], dict[str, str], float | None, int, str]:
-    """Return channels in SI units by their names, notes, period, start [ns] and motion.
+) -> tuple[dict[str, Array], dict[str, str], float | None, int, str, tuple[str, ...]]:
+    """Return channels in SI units by their names, notes, period, start [ns], motion, what to tell.
 
     There is no period where times say it.
     """
@@ -210,10 +217,11 @@ def _by_name(
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
     notes, period, start_ns = noted(table.notes, str(path)), table.period, table.start_ns
+    told = table.told
     if period is not None and 'time' in values:
         _check_period(period, values['time'], path)
     del raw, table  # a long file's columns as they were read are not held beside these
-    return values, notes, None if 'time' in values else period, start_ns, motion
+    return values, notes, None if 'time' in values else period, start_ns, motion, told
 
 
 def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
@@ -230,8 +238,8 @@ def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
 
 def _mapped(
     path: Path, channels: ChannelMap, needed: tuple[str, ...]
-) -> tuple[dict[str, Array], float | None, int]:
-    """Return channels in SI units, rest offsets removed, the period and the start [ns].
+) -> tuple[dict[str, Array], float | None, int, tuple[str, ...]]:
+    """Return channels in SI units, rest offsets removed, period, start [ns], and what to tell.
 
     There is no period where times say it.
     """
@@ -243,8 +251,8 @@ def _mapped(
     values = in_si(raw, channels, str(path), roles)
     if channels.rate is not None:
         _check_rate(channels.rate, values.get('time'), table, path)
-        return values, 1.0 / channels.rate, table.start_ns
-    return values, None, table.start_ns
+        return values, 1.0 / channels.rate, table.start_ns, table.told
+    return values, None, table.start_ns, table.told
 
 
 def _parts(channels: ChannelMap, needed: tuple[str, ...], table: FileTable) -> dict[str, Channel]:

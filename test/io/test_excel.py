@@ -66,3 +66,59 @@ def test_a_cell_that_is_no_number_is_told_with_its_row(tmp_path: Path, odd: obje
     path = workbook(tmp_path / 'a.xlsx', SECONDS.tolist(), 'time_s', odd)
     with pytest.raises(InputError, match=r"command .* first in row 43 of column 'command_mm'"):
         read(path)
+
+
+def _sheets(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
+    """Write rows by the title of their sheet."""
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+_ROWS = np.column_stack([SECONDS, COMMAND, MEASURED]).tolist()
+_RUN = [['time_s', 'command_mm', 'measured_mm'], *_ROWS]
+_SUMMARY = [['Rate', 'Load'], [100, 2], [200, 5]]
+
+
+def test_the_sheet_with_the_channels_is_read(tmp_path: Path) -> None:
+    path = _sheets(tmp_path / 'a.xlsx', {'summary': _SUMMARY, 'run': _RUN})
+    told: list[str] = []
+    np.testing.assert_allclose(read(path, warn=told.append).command, COMMAND * 1e-3)
+    assert not told
+    mapped = tmp_path / 'map.yaml'
+    mapped.write_text(
+        'time: {column: time_s, unit: s}\ncommand: {column: command_mm, unit: mm}\n'
+        'measured: {column: 3, unit: mm}\n'
+    )
+    np.testing.assert_allclose(read(path, channels=mapped).command, COMMAND * 1e-3)
+
+
+def test_of_several_sheets_with_a_record_it_is_told_which_is_read(tmp_path: Path) -> None:
+    second = [_RUN[0], *[[t, 2.0 * c, m] for t, c, m in _ROWS]]
+    path = _sheets(tmp_path / 'a.xlsx', {'run 1': _RUN, 'run 2': second, 'end': _SUMMARY})
+    told: list[str] = []
+    np.testing.assert_allclose(read(path, warn=told.append).command, COMMAND * 1e-3)
+    (line,) = told
+    assert line.startswith(f"{path}: sheet 'run 1' is read, and 'run 2' could be as well")
+
+
+def test_a_name_merged_over_two_rows_is_a_name(tmp_path: Path) -> None:
+    head = [['time_s', 'Displacement', None], [None, 'command_mm', 'measured_mm']]
+    path = _sheets(tmp_path / 'a.xlsx', {'run': [*head, *_ROWS]})
+    assert read(path).rate == 100.0
+
+
+def test_a_title_names_no_column(tmp_path: Path) -> None:
+    rows = [[None, *_RUN[0]], *[[i, *row] for i, row in enumerate(_ROWS)]]
+    assert read(_sheets(tmp_path / 'a.xlsx', {'run': [['Force test'], *rows]})).force is None
+
+
+def test_numbers_as_text_are_told(tmp_path: Path) -> None:
+    rows = [[f'{v:.5f}' for v in row] for row in _ROWS]
+    with pytest.raises(InputError, match='numbers that are kept as text are none'):
+        read(_sheets(tmp_path / 'a.xlsx', {'run': [_RUN[0], *rows]}))

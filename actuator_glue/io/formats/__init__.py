@@ -56,6 +56,7 @@ class FileTable:
         entry: where a sample, from 0, of a column at a position is, and what is written there,
             for messages; None in files that no person reads.
         unread: columns that are no numbers, by their label, and what they hold.
+        told: what a reader should know of what was taken, a line each.
     """
 
     columns: list[Column]
@@ -65,6 +66,7 @@ class FileTable:
     start_ns: int = 0
     entry: Callable[[int, int], str] | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
+    told: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Columns out of Excel workbooks (.xlsx), read only; needs openpyxl.
 
-The first sheet that holds numbers counts: names in one row, with units in the next one or not.
+The first sheet that holds the channels counts, else the first with numbers: names in one row, with
+units in the next one or not.
 Workbooks are no place for measured records (a million rows at most), so none is written.
 """
 
@@ -36,6 +37,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         _check(path)
         book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
         try:
+            found: list[tuple[Any, int, list[bool], list[Column]]] = []
             for sheet in book.worksheets:
                 sheet.reset_dimensions()  # what the file claims may be wrong
                 head = list(islice(sheet.iter_rows(values_only=True), _HEAD))
@@ -43,16 +45,45 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                 first = _first_sample(head) if lines is None else lines
                 if first is None or not any(_is_number(v) for row in head[first:] for v in row):
                     continue
-                timed, skip = _timed(head[first:]), first
+                timed = _timed(head[first:])
                 columns = _columns(head, first, timed)
+                found.append((sheet, first, [i in timed for i in range(len(columns))], columns))
+            whole = [one for one in found if _holds(one[3], channels)]
+            for sheet, skip, times, columns in (whole or found)[:1]:
                 rows = sheet.iter_rows(min_row=skip + 1, values_only=True)
-                table = _numbers(rows, [at in timed for at in range(len(columns))], skip, path)
+                table = _numbers(rows, times, skip, path)
                 return FileTable(
-                    columns, {}, partial(_chosen, table), entry=partial(_place, skip, columns)
+                    columns,
+                    {},
+                    partial(_chosen, table),
+                    entry=partial(_place, skip, columns),
+                    told=_told([one[0].title for one in whole]),
                 )
         finally:
             book.close()
-    raise InputError(f'{path}: no sheet with named columns of numbers in this workbook')
+    raise InputError(
+        f'{path}: no sheet with named columns of numbers in this workbook; numbers that are kept '
+        'as text are none'
+    )
+
+
+def _holds(columns: list[Column], channels: ChannelMap | None) -> bool:
+    """Whether a sheet has the command and the measured channel."""
+    labels: set[str | int] = {name for c in columns for name in (c.name, c.label)}
+    if channels is None:
+        return {'command', 'measured'} <= {bare(column.label) for column in columns}
+    wanted = {c.column for c in (channels.command, channels.measured)}
+    return wanted <= labels.union(range(1, len(columns) + 1))
+
+
+def _told(sheets: list[str]) -> tuple[str, ...]:
+    if len(sheets) < 2:
+        return ()
+    others = ', '.join(map(repr, sheets[1:]))
+    return (
+        f'sheet {sheets[0]!r} is read, and {others} could be as well; save each record as a file '
+        'of its own',
+    )
 
 
 def _check(path: Path) -> None:
@@ -103,6 +134,10 @@ def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[C
     if len(above) == 2 and (found := units_line(above[1])):
         units, above = found, above[:1]
     names = above[-1] if above else [str(i + 1) for i in range(len(head[first]))]
+    if len(above) == 2 and sum(map(bool, above[0])) > 1:
+        # A cell merged over both rows has its text in the upper one; a title stands alone.
+        upper = [*above[0], *[''] * len(names)]
+        names = [n or u for n, u in zip(names, upper, strict=False)]
     units += [''] * (len(names) - len(units))
     # Dates and times of day are seconds, whatever their column is called.
     return [
