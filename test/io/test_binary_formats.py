@@ -126,7 +126,7 @@ def parts(path: Path, *behind: float, period: float = 1e-3) -> Path:
 def test_segments_of_tdms_that_go_on_are_one_record(tmp_path: Path) -> None:
     """Each with its own start, stamped somewhat late, or all with the first one."""
     for second in (COUNT // 2, COUNT // 2 + 0.1, COUNT // 2 + 30, COUNT // 2 - 2, 0):
-        record = read(parts(tmp_path / 'a.tdms', 0, second))
+        record = read(parts(tmp_path / 'a.tdms', 0, second), warn=lambda _: None)
         assert record.start_ns == START_NS
         assert np.array_equal(record.command, 1e-3 * COMMAND)
 
@@ -165,6 +165,21 @@ def test_stamps_of_segments_of_tdms_may_jitter_and_not_add_up(tmp_path: Path) ->
     stamped(path, *[later(i * (every + 20)) for i in range(8)])
     with pytest.raises(InputError, match=rf'begins anew at sample {3 * every}, 0\.06 s after'):
         read(path)
+
+
+def test_a_short_gap_between_segments_of_tdms_is_told(tmp_path: Path) -> None:
+    """Where all later segments are late, as stamps are not; a clock that drifts is none."""
+    every, told = COUNT // 8, []
+    for at in (1, 4, 7):
+        late = [15.0 * (i >= at) + 0.7 * (i % 2) for i in range(8)]
+        starts = [later(i * every + j) for i, j in enumerate(late)]
+        read(stamped(tmp_path / 'a.tdms', *starts), warn=told.append)
+        assert f'from sample {at * every} on begin some 1' in told.pop()
+        assert not told
+    for late in ([0.0, 9.0, 3.0, 14.0, 2.0, 8.0, 0.0, 1.0], [0.02 * i for i in range(8)]):
+        starts = [later(i * every + j) for i, j in enumerate(late)]
+        read(stamped(tmp_path / 'a.tdms', *starts), warn=told.append)
+        assert not told
 
 
 def test_no_start_of_segments_of_tdms_is_none(tmp_path: Path) -> None:

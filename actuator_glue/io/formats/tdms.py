@@ -29,9 +29,10 @@ _NAME = 'a LabVIEW TDMS file'
 _SAME = 0.02
 # A waveform goes on where a later segment begins this near its next sample: the computer stamps a
 # segment when it has it, by a clock of ticks of 15.6 ms, and late by what else it does: two ticks
-# and some milliseconds [s], or a sample late one time and early another [1]. Shorter gaps cannot
-# be told from that, but those of many segments add up, which stamps do not.
+# and some milliseconds [s], or a sample late one time and early another [1]. A shorter gap cannot
+# be told from that for sure: it is told where all later segments are late too [samples].
 _STAMPED, _STAMPED_SAMPLES = 0.04, 2.0
+_LATE_SAMPLES = 1.5
 # Computers and converters count seconds of their own, this far apart at most [1].
 _DRIFT = 5e-4
 _WAVE = ('wf_start_time', 'wf_start_offset', 'wf_increment')
@@ -60,6 +61,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     columns: list[Column] = []
     clocks: list[_Clock] = []
     broken: list[str] = []
+    doubts: list[str] = []
     unread: dict[str, str] = {}
     stamps: set[int] = set()
     with reading(path, _NAME), tdms.open(path) as file:
@@ -82,9 +84,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     label, unit = bare(label), 's'
                     stamps.add(len(columns))
                 columns.append(Column(name, label, unit))
-                clock, fault = _whole(_clock(channel), said.get(channel.path, []))
+                clock, fault, doubt = _whole(_clock(channel), said.get(channel.path, []))
                 clocks.append(clock)
                 broken.append(fault)
+                doubts.append(doubt)
     if not columns:
         raise InputError(f'{path}: no channel of numbers in this TDMS file')
     asked = _asked(columns, channels)
@@ -101,7 +104,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             read = [_values(found[columns[at].name], path) for at in wanted]
         return [column[cuts.get(at, slice(None))] for at, column in zip(wanted, read, strict=True)]
 
-    return FileTable(columns, notes, values, period, start_ns, unread=unread)
+    told = tuple(doubts[i] for i in asked if doubts[i])[:1]
+    return FileTable(columns, notes, values, period, start_ns, unread=unread, told=told)
 
 
 def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
@@ -131,8 +135,8 @@ def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
     return found
 
 
-def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock, str]:
-    """Return the clock of a waveform from its first sample on, and what breaks it, in words.
+def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock, str, str]:
+    """Return the clock of a waveform from its first sample on, what breaks it, and what may.
 
     Args:
         last: as the last segment has it.
@@ -140,6 +144,7 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
     """
     first = previous = last
     at = 0  # values before what was said last
+    late_at = [(0, 0.0)]
     now: dict[str, Any] = {}
     for before, said_here in said:
         own = dict(said_here)
@@ -154,10 +159,11 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
         if now == known:
             continue  # every segment may repeat what the first one says
         if not same_period(previous.period, clock.period):
-            return first, (
+            fault = (
                 f'{last.name} has a sample every {previous.period:.9g} s, and every '
                 f'{clock.period:.9g} s from sample {before} on'
             )
+            return first, fault, ''
         if previous.start_ns is None and clock.start_ns is not None:
             # The first samples came before the first start that anybody says.
             ahead = before * clock.period + first.offset - clock.offset
@@ -174,12 +180,37 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
         if faults:
             late = max(faults, key=abs)
             how = 'after' if late > 0.0 else 'before'
-            return first, (
+            fault = (
                 f'{last.name} begins anew at sample {before}, {abs(late):.6g} s {how} the samples '
                 'before it end'
             )
+            return first, fault, ''
+        late_at.append((before, _ahead(first, clock) - before * clock.period))
         previous, at = clock, before
-    return first, ''
+    return first, '', _late_for_good(last, late_at)
+
+
+def _late_for_good(clock: _Clock, late_at: list[tuple[int, float]]) -> str:
+    """Return in words where segments begin late, and all later ones too; nothing elsewhere.
+
+    Stamps of a computer come late now and then; where samples are missing all later ones do.
+
+    Args:
+        clock: of the waveform.
+        late_at: first sample of each segment, and how late it is [s].
+    """
+    at, late = np.array(late_at).T
+    after = np.minimum.accumulate(late[::-1])[::-1][1:]
+    steps = after - np.maximum.accumulate(late)[:-1]
+    beyond = steps - (_DRIFT * np.diff(at) + _LATE_SAMPLES) * clock.period
+    if not len(steps) or beyond.max() < 0.0:
+        return ''
+    found = int(beyond.argmax())
+    return (
+        f'{clock.name}: the segments from sample {at[found + 1]:.0f} on begin some '
+        f'{1e3 * steps[found]:.3g} ms late; taken as stamps that came late, but samples may be '
+        'missing there'
+    )
 
 
 def _ahead(one: _Clock, other: _Clock) -> float:
