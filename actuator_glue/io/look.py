@@ -15,7 +15,7 @@ from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.text_layout import SampleRows, text_layout
-from actuator_glue.io.units import written_unit
+from actuator_glue.io.units import symbol, written_unit
 from actuator_glue.records import Array
 
 
@@ -156,7 +156,7 @@ def _file(path: Path) -> FileLook:
         ColumnLook(
             c.name if c.name and names.count(c.name) == 1 else i + 1,
             c.label,
-            c.unit or written_unit(c.label),
+            symbol(c.unit) or written_unit(c.label),
             v,
         )
         for c, i, v in zip(named, places, table.values(places), strict=True)

@@ -59,6 +59,10 @@ _WORDS = {
     'metre': 'm',
     'millimeter': 'mm',
     'millimetre': 'mm',
+    'milimeter': 'mm',  # often written so, and nothing else
+    'millimètre': 'mm',
+    'milímetro': 'mm',
+    'millimetro': 'mm',
     'centimeter': 'cm',
     'centimetre': 'cm',
     'micrometer': 'um',
@@ -224,7 +228,8 @@ def written_unit(name: str) -> str:
     units = [w for w in words[:-1] if w in _KNOWN and len(w) > 1 and w != 'in']
     units += [w for w in words[-1:] if w in _KNOWN]
     capitals = [w for w in words if w.isupper() and len(w) > 1 and w.lower() in _LOWER]
-    return (units or capitals or [str(text) for text in inside] or [''])[-1]
+    found = (units or capitals or [str(text) for text in inside] or [''])[-1]
+    return symbol(found) if is_unit(found) else found
 
 
 def symbol(unit: str) -> str:

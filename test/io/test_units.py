@@ -194,6 +194,8 @@ def test_units_said_twice_alike_are_read(tmp_path: Path, units: str) -> None:
         ('mN', 'mN'),
         ('--', ''),
         ('furlong', 'furlong'),
+        ('Milimeters', 'mm'),
+        ('Millimètres', 'mm'),
     ],
 )
 def test_words_are_units_in_any_capitals_and_symbols_in_their_own(
