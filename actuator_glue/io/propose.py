@@ -159,7 +159,10 @@ def _clock(columns: list[ColumnLook]) -> Guess | None:
     if column.steps is not None:
         even_clock = column.rate is not None and not uneven(column.steps)
         reasons.append('goes on evenly' if even_clock else 'goes on, in uneven steps')
-    return _guess(column, 'time', tuple(reasons))
+    guess = _guess(column, 'time', tuple(reasons))
+    others = [_name(c) for c in named if c is not column and c.steps is not None]
+    doubt = f'role: {", ".join(others)} may be it as well; channels need the same times'
+    return _unsure(guess, (doubt,) * bool(others))
 
 
 def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float | None:

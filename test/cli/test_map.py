@@ -94,6 +94,26 @@ def test_names_units_and_times_are_used(tmp_path: Path) -> None:
     assert ranges['Istwert'] == pytest.approx((measured.min(), measured.max()), abs=1e-6)
 
 
+def test_inches_with_a_point_are_inches(tmp_path: Path) -> None:
+    """As a word or an abbreviation a unit that is known needs no scale and no second look."""
+    command, measured, _ = channels()
+    head = 'Time (seconds),Cmd (in.),Disp (Inches)'
+    path = write(tmp_path / 'a.csv', head, [TIME, command / 25.4, measured / 25.4])
+    found = looked(tmp_path, path, '--out', str(tmp_path / 'map.yaml'))
+    assert all(not channel['check'] for channel in found['channels'].values())
+    (record,) = load_records(path, channels=tmp_path / 'map.yaml')
+    np.testing.assert_allclose(record.command, command * 1e-3, atol=1e-7)
+
+
+def test_a_second_column_of_times_is_told(tmp_path: Path) -> None:
+    """Each channel may have its own: the first one alone would leave the other shifted."""
+    command, measured, _ = channels()
+    head = 'Time 1 [s],Command [mm],Time 2 [s],Position [mm]'
+    path = write(tmp_path / 'a.csv', head, [TIME, command, TIME + 0.0105, measured])
+    (told,) = looked(tmp_path, path)['channels']['time']['check']
+    assert 'Time 2 [s] may be it as well' in told
+
+
 @pytest.mark.parametrize('first', [45_415.0, 739_375.25])
 def test_days_are_proposed_as_such(tmp_path: Path, first: float) -> None:
     """A spreadsheet counts them since 1900, MATLAB since year 0; never a rate in place of them."""
