@@ -11,7 +11,10 @@ from actuator_glue.errors import InputError
 
 Array: TypeAlias = NDArray[np.float64]
 
-_DAY = 86_400.0  # s
+_DAY, _HOUR = 86_400.0, 3600.0  # s
+# Counters of 31 or 32 bits in ns, us or ms, of 16 bits in ms, and seconds of a minute are full
+# after so many [s].
+_FULL = (60.0, 2.0**16 * 1e-3, *(2.0**b * u for b in (31, 32) for u in (1e-9, 1e-6, 1e-3)))
 # A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _TOLERANCE = 0.25
 # Share of the steps that far off their median above which a clock is uneven throughout: a few
@@ -48,9 +51,7 @@ def uniform_period(time: Array, where: str) -> float:
     back = steps <= 0.0
     if back.any():
         at = int(back.argmax())
-        how, remedy = 'goes back', 'sort the record, or cut it there'
-        if abs(steps[at] + _DAY) < 1.0:
-            remedy = 'times of day pass midnight there: give the dates, too, or cut the record'
+        how, remedy = 'goes back', _where_back(steps, at)
         if steps[at] == 0.0:
             how, remedy = 'stands still', 'cut the record there'
             if steps.min() == 0.0 < steps.max():
@@ -59,8 +60,8 @@ def uniform_period(time: Array, where: str) -> float:
                     f'even, {_even_instead(time)}'
                 )
         raise InputError(
-            f'{where}: time {how} at sample {at + 1} ({time[at]:.9g} s, then '
-            f'{time[at + 1]:.9g} s); {remedy}'
+            f'{where}: time {how} at sample {at + 1} ({time[at]:.13g} s, then '
+            f'{time[at + 1]:.13g} s); {remedy}'
         )
     typical = float(np.median(steps))
     period = float((time[-1] - time[0]) / (len(time) - 1))
@@ -93,6 +94,31 @@ def uniform_period(time: Array, where: str) -> float:
             f'periods off an even clock; --resample {near_rate(time)} makes them even'
         )
     return near_whole_rate(period, len(time), rounded)
+
+
+def _where_back(steps: Array, at: int) -> str:
+    """Return what to do where times go back, by how far they do.
+
+    Args:
+        steps: differences of the times, shape (n - 1,) [s].
+        at: which one is negative.
+    """
+    typical = float(np.median(steps))
+    lost = typical - float(steps[at])
+    if abs(lost - _DAY) < 1.0:
+        return 'times of day pass midnight there: give the dates, too, or cut the record'
+    near = 1.5 * abs(typical)
+    if abs(lost - _HOUR) < near:
+        return (
+            'clocks are put back an hour there, or the times have no hours: give them with their '
+            'zone, or in UTC, or cut the record'
+        )
+    if any(abs(lost - whole) < near for whole in _FULL):
+        return (
+            f'they begin anew, as a counter does that is full after {lost:.9g} s: add that to all '
+            'times from there on, or cut the record'
+        )
+    return 'sort the record, or cut it there'
 
 
 def _even_instead(time: Array) -> str:

@@ -378,6 +378,12 @@ def _check_numbers(
         bad = ~np.isfinite(column)
         if bad.any():
             row = int(bad.argmax())
+            if role == 'time' and bad.all():
+                raise InputError(
+                    f'{path}: time is not understood in any sample, first in '
+                    f'{table.entry(row, at)}; write seconds, or times as in '
+                    '2024-05-03 08:00:00.123, and name the column for instance time_s'
+                )
             raise InputError(
                 f'{path}: {role} is NaN or infinite, or no number, in {int(bad.sum())} of '
                 f'{len(bad)} samples, first in {table.entry(row, at)}; cut or repair the record '

@@ -44,6 +44,9 @@ def table(path: Path, form: str, start: datetime.datetime = START, by: str = ','
         ('%I:%M:%S.MS %p', ';', 35_998),
         ('%H:%M:%S.MS', ' ', 35_998),
         ('%H:%M:%S,MS000', ';', 35_998),
+        ('%Y.%m.%d %H:%M:%S.MS', ',', DAY + 35_998),
+        ('%Y-%m-%d %H:%M:%S:MS', ',', DAY + 35_998),
+        ('%H:%M:%S:MS', '\t', 35_998),
     ],
 )
 def test_stamps_are_times(tmp_path: Path, form: str, by: str, start: int) -> None:
@@ -99,4 +102,34 @@ def test_what_no_clock_shows_is_no_time(tmp_path: Path, odd: str) -> None:
     path = table(tmp_path / 'a.csv', '%d.%m.%Y %H:%M:%S.MS')
     path.write_text(path.read_text().replace('03.05.2024 09:59:58.750', odd))
     with pytest.raises(InputError, match='time is NaN'):
+        read(path)
+
+
+@pytest.mark.parametrize('form', ['%Y%m%dT%H%M%S.MS', '%M:%S.MS'])
+def test_times_that_nobody_understands_are_told_as_such(tmp_path: Path, form: str) -> None:
+    """All of them: no row to cut or repair."""
+    path = table(tmp_path / 'a.csv', form)
+    path.write_text(path.read_text().replace('Timestamp', 'time_s'))
+    with pytest.raises(InputError, match='time is not understood in any sample, first in line 2'):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ('begins', 'full', 'told'),
+    [
+        (3599.0, 3600.0, 'clocks are put back an hour there'),
+        (59.0, 60.0, 'full after 60 s'),
+        (65.0, 65.536, 'full after 65.536 s'),
+        (4294.0, 4294.967296, r'full after 4294.967\d* s'),
+        (7.0, 7.7, 'sort the record'),
+    ],
+)
+def test_how_far_times_go_back_tells_why(
+    tmp_path: Path, begins: float, full: float, told: str
+) -> None:
+    """A counter that is full, an hour of summer time, or nothing known."""
+    rows = [f'{(begins + 1e-3 * i) % full:.6f},{i % 7},{i % 5}' for i in range(2000)]
+    path = tmp_path / 'a.csv'
+    path.write_text('\n'.join(['time_s,command_mm,measured_mm', *rows]) + '\n')
+    with pytest.raises(InputError, match=f'time goes back at sample .*{told}'):
         read(path)

@@ -38,11 +38,11 @@ _MONTHS = ('jan', 'feb', 'mar', 'apr', 'may', 'jun', 'jul', 'aug', 'sep', 'oct',
 # A date whose order is known: year first, dots behind the day, or a month by its name. Of any
 # other, such as 05/03/2024, only the time of day is taken.
 _STAMP = re.compile(
-    r'(?:(?:(?P<year>\d{4})[-/](?P<month>\d\d)[-/](?P<day>\d\d)'
+    r'(?:(?:(?P<year>\d{4})[-/.](?P<month>\d\d)[-/.](?P<day>\d\d)'
     r'|(?P<day_2>\d{1,2})\.(?P<month_2>\d{1,2})\.(?P<year_2>\d{4})'
     rf'|(?P<day_3>\d{{1,2}})[- ](?P<name>{"|".join(_MONTHS)})[- ](?P<year_3>\d{{4}})'
     r'|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d\d))(?:T|,? ))?'
-    r'(?P<hour>\d{1,2})(?P<clock>:\d\d:\d\d)(?:[.,](?P<fraction>\d+))?'
+    r'(?P<hour>\d{1,2})(?P<clock>:\d\d:\d\d)(?:(?:[.,]|:(?=\d{3}\b))(?P<fraction>\d+))?'
     r'(?: ?(?P<half>[ap])\.?m\.?)?(?: ?(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d))?',
     re.ASCII | re.IGNORECASE,
 )
