@@ -150,7 +150,7 @@ def channels_of(
         raise InputError(f'{path}: there is no such file')
     refuse_pipe(path)
     if path.is_dir():
-        raise InputError(f'{path}: this is a folder, and no bag in MCAP format')
+        raise InputError(f'{path}: this is a folder, and no bag in MCAP format; give its files')
     channels = channel_map_given(channels)
     if channels is not None:
         values, period, start_ns, told = _mapped(path, channels, needed)

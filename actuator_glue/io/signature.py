@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 from typing import Literal, TextIO
 
@@ -11,6 +12,8 @@ from actuator_glue.errors import InputError
 _LOOK = 65_536  # bytes
 _TABLE = 'save the table as .csv'
 _UNPACK = 'unpack it first'
+_NETCDF = 'save it as netCDF-4, which is HDF5, or as .csv'
+_PICKLE = f'such a file can run programs when it is opened, and is never read: {_TABLE}'
 _BAG = 'give the folder of a bag in MCAP format'
 _CONVERT = '`rosbags-convert --src OLD --dst NEW --dst-storage mcap` makes one'
 
@@ -33,6 +36,14 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b'%PDF-', 'a PDF document', _TABLE),
     (b'\x89PNG', 'a picture', _TABLE),
     (b'\xff\xd8\xff', 'a picture', _TABLE),
+    (b'FEA1', 'a Feather file', _TABLE),
+    *((b'CDF' + n, 'a netCDF file of the classic kind', _NETCDF) for n in (b'\1', b'\2', b'\5')),
+    *((b'\x80' + n, 'a Python pickle', _PICKLE) for n in (b'\2', b'\3', b'\4', b'\5')),
+)
+# Beginnings of text that is no table.
+_NO_TABLE = (
+    (re.compile(rb'\s*(\{\s*"|\[\s*[\[{])'), 'JSON'),
+    (re.compile(rb'\s*<(\?xml|!doctype|html|table)\b', re.IGNORECASE), 'XML or HTML'),
 )
 _ZIP = b'PK\x03\x04'
 # What a zip archive of that kind has in its first entries.
@@ -154,10 +165,13 @@ def open_text(path: Path, errors: Literal['strict', 'replace'] = 'strict') -> Te
         errors: 'replace' where bytes that are no character of its coding may be there.
 
     Raises:
-        InputError: the file cannot be read, or is no text.
+        InputError: the file cannot be read, or is no text, or one that holds no table.
     """
-    encoding = text_encoding(path)
-    doubled = '\r\r\n' in beginning(path).decode(encoding, 'replace')
+    encoding, start = text_encoding(path), beginning(path)
+    for mark, what in _NO_TABLE:
+        if mark.match(unmarked(start)):
+            raise InputError(f'{path}: this is {what}, not a table of numbers; {_TABLE}')
+    doubled = '\r\r\n' in start.decode(encoding, 'replace')
     try:
         return path.open(encoding=encoding, errors=errors, newline='\n' if doubled else None)
     except OSError as error:

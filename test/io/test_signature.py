@@ -10,6 +10,7 @@ import pytest
 from actuator_glue.errors import LONGEST, InputError
 from actuator_glue.io.channel_map import read_channel_map
 from actuator_glue.io.laboratory import read
+from actuator_glue.io.look import look
 
 TIME = np.arange(50) * 0.01
 ROWS = [[f'{t:.2f}', f'{math.sin(t)!r}', f'{math.cos(t)!r}'] for t in TIME.tolist()]
@@ -36,6 +37,10 @@ def text(delimiter: str = ',', quote: str = '', decimal: str = '.') -> str:
         (b'SQLite format 3\0' + BYTES, 'rosbags-convert'),
         (b'\x89MCAP0\r\n' + BYTES, 'MCAP'),
         (b'\x1f\x8b' + BYTES, 'gzip'),
+        (b'CDF\1' + BYTES, 'netCDF'),
+        (b'FEA1' + BYTES, 'Feather'),
+        (pickle.dumps(dict.fromkeys(HEAD, ROWS)), 'pickle'),
+        (pickle.dumps(dict.fromkeys(HEAD, ROWS), protocol=2), 'pickle'),
         (BYTES, 'binary|MATLAB'),
         (bytes(range(1, 256)) * 50, 'binary|MATLAB'),
     ],
@@ -51,6 +56,27 @@ def test_what_is_no_text_is_named(tmp_path: Path, content: bytes, name: str, suf
         assert str(path) in message
         assert message.isprintable()
         assert len(message) <= LONGEST
+
+
+@pytest.mark.parametrize('coding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize(
+    ('content', 'name'),
+    [
+        ('{"time_s": [0.0, 0.1], "command_mm": [1.0, 2.0]}', 'JSON'),
+        ('[{"time_s": 0.0, "command_mm": 1.0},\n {"time_s": 0.1, "command_mm": 2.0}]', 'JSON'),
+        ('<?xml version="1.0"?>\n<Workbook>', 'XML'),
+        ('\n<TABLE><tr><td>time_s</td></tr>', 'HTML'),
+    ],
+)
+def test_text_that_is_no_table_is_named(
+    tmp_path: Path, content: str, name: str, coding: str
+) -> None:
+    """Web services and old spreadsheets save such under names of tables."""
+    path = tmp_path / 'a.xls'
+    path.write_bytes(content.encode(coding))
+    for use in (read, look):
+        with pytest.raises(InputError, match=f'this is .*{name}.*, not a table of numbers; save'):
+            use(path)
 
 
 @pytest.mark.parametrize(

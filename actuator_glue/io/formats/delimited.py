@@ -24,6 +24,7 @@ from actuator_glue.records import Array
 _ROWS = 10_000  # rows read or written at a time
 _LOOK = 100  # rows that tell how a text is laid out
 _ENDS = 200  # last rows that tell whether a text was cut off within its last number
+_SHOWN = 60  # characters of a line in a message
 _BROKEN = 10  # lines over which the names may go on: spreadsheets break lines within cells
 # A comma may be the decimal sign where there is another delimiter, so it comes behind the usual
 # ones.
@@ -504,7 +505,7 @@ def _check_widths(
         raise InputError(
             f'{path}: cannot read the samples: line {number} has {width} entries, other rows '
             f'have {head.width}: a column would be shifted, or the file is cut off there; mend or '
-            f'remove that line ({line.strip()[:60]!r}); where another block of samples begins '
+            f'remove that line ({line.strip()[:_SHOWN]!r}); where another block of samples begins '
             'there, `actuator-glue map` proposes which to read'
         )
 
@@ -530,7 +531,7 @@ def entry_at(path: Path, head: TextHead, row: int, position: int) -> str:
     with open_text(path, errors='replace') as file:
         number, line = next(islice(_rows(file, head), row, None))
     entries = [*fields_of(line, head.delimiter), *[''] * head.width]
-    said = f'line {number}: {entries[position]!r}'
+    said = f'line {number}: {entries[position][:_SHOWN]!r}'
     if head.decimal == ',' and is_number(entries[position]):
         return f'{said} (a point where the comma is decimal: export it without thousands)'
     return said
