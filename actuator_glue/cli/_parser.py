@@ -21,6 +21,18 @@ def examples(epilog: str, commands: Sequence[str]) -> str:
     return '\n'.join([epilog, '', 'Examples:', *lines])
 
 
+def _without_dashes(args: list[str]) -> list[str]:
+    """Return arguments without `--`: names with a dash behind it are files of this folder.
+
+    Where positional arguments stand among options, argparse loses those behind it.
+    """
+    if '--' not in args:
+        return args
+    at = args.index('--')
+    names = [f'./{name}' if name.startswith('-') else name for name in args[at + 1 :]]
+    return [*args[:at], *names]
+
+
 class Parser(argparse.ArgumentParser):
     """Arguments of the program or of one command, in any order."""
 
@@ -39,7 +51,8 @@ class Parser(argparse.ArgumentParser):
             return super().parse_known_args(args, namespace)
         self._within = True
         try:
-            found, unknown = self.parse_known_intermixed_args(self._spread(args), namespace)
+            plain = _without_dashes(self._spread(args))
+            found, unknown = self.parse_known_intermixed_args(plain, namespace)
         finally:
             self._within = False
         if unknown:

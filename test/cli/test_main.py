@@ -106,6 +106,20 @@ def test_records_may_stand_after_stiffnesses(command: str, arguments: tuple[str,
     assert found.stiffness == [0.0, 250e3]
 
 
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ('--stiffness', '0', '250e3', '--', '-a.csv', 'b.csv'),
+        ('--stiffness=0', '--stiffness=250e3', '--', '-a.csv', 'b.csv'),
+    ],
+)
+def test_a_name_may_begin_with_a_dash(arguments: tuple[str, ...]) -> None:
+    """Behind `--`, as everywhere; where that lies is the same file."""
+    found = parse('info', *arguments)
+    assert found.records == ['./-a.csv', 'b.csv']
+    assert found.stiffness == [0.0, 250e3]
+
+
 @pytest.mark.parametrize('command', ['calibrate', 'diagnose', 'info', 'convert'])
 def test_unknown_is_a_stiffness_among_others(command: str) -> None:
     """One value per record, and this word is one; where no such value can be, it is a name."""
