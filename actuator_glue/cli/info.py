@@ -84,7 +84,8 @@ def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:
     filled = [p for p in summary.parts if p.count]
     start = min((p.start for p in filled), default=0)
     seconds = (max((p.stop for p in filled), default=0) - start) * 1e-9
-    size = sum(p.stat().st_size for p in Path(path).glob('*.mcap')) if Path(path).is_dir() else 0
+    # `.mcap.zstd` is how `ros2 bag` compresses whole files.
+    size = sum(p.stat().st_size for p in Path(path).glob('*.mcap*')) if Path(path).is_dir() else 0
     size = size or Path(path).stat().st_size
     total = sum(p.count for p in summary.parts)
     say(

@@ -218,3 +218,20 @@ def test_stiffness_and_options_that_cannot_be_used(run, tmp_path: Path, problem_
     assert '--stiffness N/m' in run('replay', unknown).message
     assert 'channel map' in run('info', one, '--channels', tmp_path / 'no.yaml').message
     assert 'is no folder' in run('info', one, '--json', one / 'x.json').message
+
+
+def test_a_compressed_bag_has_its_size(run, tmp_path: Path, short_bag: Path) -> None:
+    """`info` tells the bytes of `.mcap.zstd`, as rosbag2 names such files."""
+    import shutil
+
+    import zstandard
+
+    folder = shutil.copytree(short_bag, tmp_path / 'copy')
+    (plain,) = folder.glob('*.mcap')
+    small = plain.with_name(f'{plain.name}.zstd')
+    small.write_bytes(zstandard.compress(plain.read_bytes()))
+    plain.unlink()
+    listed = (folder / 'metadata.yaml').read_text().replace(plain.name, small.name)
+    (folder / 'metadata.yaml').write_text(listed)
+    assert f'{small.stat().st_size / 1e6:.2f} MB' in run('info', folder).out
+    assert ', 0.00 MB' not in run('info', folder).out
