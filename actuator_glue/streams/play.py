@@ -52,7 +52,8 @@ def check(record: Record, layout: Layout) -> None:
         )
     if layout.rate is not None and not same_period(record.rate, layout.rate):
         raise InputError(
-            f'{record.source}: {record.rate:g} Hz, but {layout.source} says {layout.rate:g} Hz'
+            f'{record.source}: {record.rate:g} Hz, but {layout.source} says {layout.rate:g} Hz; '
+            f'write `rate: {record.rate:g}` there, or send a record of that rate'
         )
     if 'force' in layout.fields and record.force is None and layout.source:
         raise InputError(f'{record.source}: no force, but {layout.source} has one')

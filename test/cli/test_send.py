@@ -62,7 +62,7 @@ def test_datagrams_to_nobody_are_told(csv, capsys):
         (['--to', 'udp://127.0.0.1:1', '--key-file', 'none'], 'key file cannot be read'),
         (
             ['--to', 'udp://127.0.0.1:1', '--layout', str(LAYOUTS / 'speedgoat.yaml')],
-            'says 2000 Hz',
+            'says 2000 Hz; write `rate: ',
         ),
         (
             ['--to', 'tcp://127.0.0.1:1', '--layout', str(LAYOUTS / 'labview_tcp.yaml')],
