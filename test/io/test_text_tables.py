@@ -297,3 +297,16 @@ def test_a_delimiter_in_quotes_parts_no_name_either(tmp_path: Path) -> None:
     path = table(tmp_path / 'a.csv', rows, ('time_s', 'command_mm', 'measured_mm', '"force, N"'))
     with pytest.raises(InputError, match='4 names, but 5 entries'):
         read(path)
+
+
+@pytest.mark.parametrize('form', ['{:7.3f}{:8.4f}{:8.4f}{:6.0f}', '{:5.3f}{:8.4f}{:8.4f}{:7.0f}'])
+def test_numbers_that_touch_are_told(tmp_path: Path, form: str) -> None:
+    """Columns of a fixed width, too narrow for some rows or for all."""
+    rows = [
+        form.format(t, 10.0 * c - 5.0, 10.0 * m - 5.0, f)
+        for t, c, m, f in zip(*COLUMNS, strict=True)
+    ]
+    path = tmp_path / 'a.txt'
+    path.write_text('\n'.join([' '.join(NAMES), *rows]) + '\n')
+    with pytest.raises(InputError, match='numbers touch each other: save them with a delimiter'):
+        read(path)

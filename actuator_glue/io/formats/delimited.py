@@ -50,6 +50,9 @@ _STAMP = re.compile(
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
+# Numbers of a fixed width without a blank between them, and what to do.
+_TOUCHING = re.compile(r'\d[+-]\d|\.\d+\.\d')
+_TOUCH = 'numbers touch each other: save them with a delimiter, or in wider columns'
 # What begins a comment: `#` as numpy writes it, `%` as MATLAB does.
 _COMMENT = re.compile(r'\s*(?:#[#\s]*|%+\s+)')
 # Names of columns that go up by themselves: a running number below one may be its values.
@@ -502,6 +505,11 @@ def _check_widths(
         remarks = fields_of(line, head.delimiter)[head.least :]
         if head.least < head.width and width > head.width and not any(map(is_number, remarks)):
             continue  # several remarks with the delimiter between them
+        if head.delimiter is None and width < head.least and _TOUCHING.search(line):
+            raise InputError(
+                f'{path}: cannot read the samples: {_TOUCH}, in line {number} '
+                f'({line.strip()[:_SHOWN]!r})'
+            )
         raise InputError(
             f'{path}: cannot read the samples: line {number} has {width} entries, other rows '
             f'have {head.width}: a column would be shifted, or the file is cut off there; mend or '
@@ -584,6 +592,11 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         )
         wanted = [channel.column for channel in channels.roles().values()]
         by_name = any(isinstance(column, str) for column in (*wanted, channels.sample_number))
+    if by_name and head.delimiter is None and 0 < head.width < head.named:
+        raise InputError(
+            f'{path}: cannot read the samples: {head.named} names, but {head.width} entries in '
+            f'the first row; if {_TOUCH}'
+        )
     if by_name and head.named and not head.names:
         raise InputError(
             f'{path}: cannot read the samples: {head.named} names, but {head.width} entries in '
