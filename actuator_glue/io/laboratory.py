@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -20,7 +20,16 @@ from actuator_glue.io.file_notes import noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
-from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, of_file, recognise
+from actuator_glue.io.units import (
+    FLOAT32_COUNTS,
+    ROLES,
+    choose,
+    contradict,
+    of_file,
+    recognise,
+    symbol,
+    written_unit,
+)
 from actuator_glue.records import Array, Hold, Record
 
 # A channel "at rest" may move by this share of its range: noise does, a test does not.
@@ -249,10 +258,25 @@ def _mapped(
     if counter is not None:
         _check_counter(counter, path)
     values = in_si(raw, channels, str(path), roles)
+    told = (*table.told, *_unlike_map(table, roles))
     if channels.rate is not None:
         _check_rate(channels.rate, values.get('time'), table, path)
-        return values, 1.0 / channels.rate, table.start_ns, table.told
-    return values, None, table.start_ns, table.told
+        return values, 1.0 / channels.rate, table.start_ns, told
+    return values, None, table.start_ns, told
+
+
+def _unlike_map(table: FileTable, roles: dict[str, Channel]) -> Iterator[str]:
+    """Yield where a map gives another unit than the file does, and no scale between them."""
+    for role, channel in roles.items():
+        at = position(channel.column, table.columns, role)
+        column = table.columns[at] if at < len(table.columns) else Column('', '')
+        said = symbol(column.unit) or written_unit(column.label)
+        if channel.scale == 1.0 and contradict(channel.unit, said):
+            yield (
+                f'{role}: the channel map says {channel.unit!r}, and the file {said!r} of column '
+                f'{column.name.strip()!r}; the map counts. If the file is right, give '
+                f'`unit: {said}`, or {channel.unit} per {said} as `scale`'
+            )
 
 
 def _parts(channels: ChannelMap, needed: tuple[str, ...], table: FileTable) -> dict[str, Channel]:

@@ -105,3 +105,29 @@ def test_a_wrong_column_and_a_moving_rest(tmp_path: Path) -> None:
     far = parse_channel_map({**MAP, 'command': {'column': 9, 'unit': 'mm'}}, 'map')
     with pytest.raises(InputError, match='cannot read the samples'):
         read(path, channels=far)
+
+
+@pytest.mark.parametrize(
+    ('unit', 'scale', 'told'),
+    [
+        ('in', 1.0, "command: the channel map says 'in', and the file 'mm' of column 'Weg [mm]'"),
+        ('mm', 1.0, ''),
+        ('in', 0.5, ''),
+    ],
+)
+def test_another_unit_than_the_file_gives_is_told(
+    tmp_path: Path, unit: str, scale: float, told: str
+) -> None:
+    """The map counts, as it may mend a wrong name; with a scale it converts."""
+    path = tmp_path / 'a.csv'
+    path.write_text('Weg [mm],y\n' + ''.join(f'{i},{i}\n' for i in range(20)))
+    content = {
+        'command': {'column': 'Weg [mm]', 'unit': unit, 'scale': scale},
+        'measured': {'column': 2, 'unit': 'mm'},
+        'rate': 100,
+    }
+    said: list[str] = []
+    record = read(path, channels=parse_channel_map(content, 'map'), warn=said.append)
+    assert record.command[1] == pytest.approx(scale * {'in': 25.4e-3, 'mm': 1e-3}[unit])
+    assert bool(said) == bool(told)
+    assert all(told in line for line in said)
