@@ -1,5 +1,6 @@
 """Which refits of further effects are finished."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -24,6 +25,11 @@ ROUGH = {
 }
 
 
+def promising(shares: Mapping[str, float]) -> Any:
+    """Return what promises these shares of the squared error, whatever the structure."""
+    return SimpleNamespace(share=lambda current, name, least=0.0: shares[name])
+
+
 def trial(name: str, score: float, error: float) -> Trial:
     """Return a refit with this score and error."""
     fit: Any = SimpleNamespace(error=np.full(4, 1e-6 * error))
@@ -36,9 +42,6 @@ def test_a_refit_that_leaves_far_less_is_finished_whatever_its_score(seed: int) 
     finished = []
 
     class Rough(Refits):
-        def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
-            return 0.5
-
         def add(
             self, current: Trial, name: str, each: Each = map, *, briefly: bool = False
         ) -> Trial:
@@ -50,7 +53,9 @@ def test_a_refit_that_leaves_far_less_is_finished_whatever_its_score(seed: int) 
 
     names = tuple(np.random.default_rng(seed).permutation(list(ROUGH)))
     data: Any = None
-    found = Rough(data, names).additions(trial('hum', -100.0, 67.0))
+    found = Rough(data, names, _promises=promising(dict.fromkeys(names, 0.5))).additions(
+        trial('hum', -100.0, 67.0)
+    )
     assert found[0].added == 'flow-saturation'
     assert 'command-rate' not in finished
     assert sorted(t.added for t in found) == sorted(ROUGH)
@@ -62,9 +67,6 @@ def test_what_promises_far_less_than_another_is_left_out_or_listed_after_one_ste
     asked = dict[str, bool]()
 
     class Promising(Refits):
-        def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
-            return promised[name]
-
         def add(
             self, current: Trial, name: str, each: Each = map, *, briefly: bool = False
         ) -> Trial:
@@ -76,10 +78,11 @@ def test_what_promises_far_less_than_another_is_left_out_or_listed_after_one_ste
 
     data: Any = None
     base = trial('hum', -100.0, 67.0)
-    Promising(data, tuple(promised)).additions(base)
+    refits = Promising(data, tuple(promised), _promises=promising(promised))
+    refits.additions(base)
     assert asked == {'drift': False, 'backlash': False, 'delay': True, 'gain': True}
     asked.clear()
-    Promising(data, tuple(promised)).additions(base, tuple(promised))
+    refits.additions(base, refits.names)
     assert asked == {'drift': False, 'backlash': False}
 
 
@@ -91,9 +94,6 @@ def test_where_no_signature_promises_any_of_much_structure_each_is_refitted(
     asked = list[str]()
 
     class Silent(Refits):
-        def _promise(self, current: Trial, name: str, least: float = 0.0) -> float:
-            return 1e-3
-
         def _structure(self, fit: Fit) -> float:
             return remains
 
@@ -108,6 +108,6 @@ def test_where_no_signature_promises_any_of_much_structure_each_is_refitted(
 
     data: Any = None
     base = trial('hum', -100.0, 67.0)
-    refits = Silent(data, ('drift', 'gain'))
+    refits = Silent(data, ('drift', 'gain'), _promises=promising({'drift': 1e-3, 'gain': 1e-3}))
     refits.additions(base, refits.names, below=0.9 * base.mean_square)
     assert sorted(set(asked)) == refitted
