@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,7 @@ def compare_compensators(
                 frequencies=frequencies,
                 criteria=criteria,
                 seed=seed,
+                progress=partial(_within, done, len(found)),
             )
             done(len(found) / len(KINDS))
 
@@ -125,6 +127,11 @@ def compare_compensators(
         return found[kind].p_unstable.upper, float('inf') if worst is None else worst
 
     return Comparison(found, min(found, key=rank))
+
+
+def _within(done: Callable[[float], object], before: int, share: float) -> None:
+    """Tell the share of all compensators that is done, from that of one."""
+    done((before + share) / len(KINDS))
 
 
 def _worst(found: StabilityResult) -> float | None:

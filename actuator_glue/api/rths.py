@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.effect_cost import effect_costs, margins
@@ -43,6 +44,7 @@ def rths(
     ground_motion: GroundMotion | Path | str | None = None,
     criteria: Mapping[str, float] | None = None,
     seed: int | None = 1,
+    progress: Callable[[float], object] | bool | None = None,
 ) -> StabilityResult:
     """Return how likely a hybrid test is unstable with a calibrated actuator.
 
@@ -63,6 +65,9 @@ def rths(
             'force' of the specimen [N].
         seed: of the specimen's draws, where the partition gives it standard deviations, and of
             the sensors' noise; None for a fresh one, which the result says.
+        progress: called with the share of the virtual test that is done, in (0, 1]; True for a
+            bar, False for none; None for a bar in a notebook only. A callback that fails is not
+            called again.
 
     Raises:
         InputError: a partition, posterior or option that cannot be used.
@@ -102,7 +107,9 @@ def rths(
             partition, loop.draws, loop.names, loop.effects, specimen, chosen, ground, seed
         )
         motion = ground_motion.name, ground_motion.duration
-        virtual = summarise(run(test), test.time, motion, criteria, effective)
+        with shown('virtual test', 1.0, progress) as done:
+            responses = run(test, done)
+        virtual = summarise(responses, test.time, motion, criteria, effective)
     margin, growth = margins(loop, chosen)
     moved = 0.0
     if virtual is not None:

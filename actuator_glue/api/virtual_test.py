@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from os import cpu_count
@@ -90,10 +90,19 @@ def check_criteria(criteria: Mapping[str, float]) -> None:
             raise InputError(f'criterion {name}: limit {limit:g} {CRITERIA[name]} is not positive')
 
 
-def run(test: VirtualTest) -> Responses:
-    """Run all blocks of a virtual test, one to a core."""
+def run(test: VirtualTest, done: Callable[[float], object]) -> Responses:
+    """Run all blocks of a virtual test, one to a core.
+
+    Args:
+        test: the virtual test.
+        done: called with the share of the blocks that have run, in (0, 1].
+    """
+    parts = []
     with ThreadPoolExecutor(cpu_count() or 1) as pool:
-        return joined(pool.map(test.run, range(test.blocks)))
+        for part in pool.map(test.run, range(test.blocks)):
+            parts.append(part)
+            done(len(parts) / test.blocks)
+    return joined(parts)
 
 
 def summarise(

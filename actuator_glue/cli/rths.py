@@ -129,13 +129,15 @@ def run(args: argparse.Namespace) -> int:
             )
         found = compared.found[compared.best]
     else:
-        found = rths(
-            args.partition,
-            calibration,
-            compensator=args.compensator,
-            ground_motion=motion,
-            **options,
-        )
+        with progress('virtual test', 1.0) as done:
+            found = rths(
+                args.partition,
+                calibration,
+                compensator=args.compensator,
+                ground_motion=motion,
+                progress=False if motion is None else done,
+                **options,
+            )
     go = not found.problems if args.limit is None else found.go(args.limit)
     more: dict[str, Any] = {} if args.limit is None else {'limit': args.limit, 'go': go}
     if compared is not None:

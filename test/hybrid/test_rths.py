@@ -240,6 +240,23 @@ def test_the_command_line_decides(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(['rths', 'sdof', '--posterior', str(path), '--limit', '2']) == 2
 
 
+def test_a_virtual_test_shows_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After each block of draws; on the command line, too."""
+    from actuator_glue.cli import rths as command
+
+    shares: list[float] = []
+    options = {'draws': 70, 'ground_motion': 'artificial'}
+    ag.rths('sdof', posterior(), progress=shares.append, **options)
+    assert shares == pytest.approx([1 / 3, 2 / 3, 1.0])
+    shown: list[float] = []
+    monkeypatch.setattr(command, 'progress', lambda *_: nullcontext(shown.append))
+    path = str(posterior().save(tmp_path / 'posterior.npz'))
+    main(['rths', 'sdof', '--posterior', path, '--draws', '70', '--ground-motion', 'artificial'])
+    assert shown == shares
+
+
 def test_comparing_compensators_shows_how_far_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
