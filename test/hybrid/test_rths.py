@@ -240,6 +240,25 @@ def test_the_command_line_decides(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(['rths', 'sdof', '--posterior', str(path), '--limit', '2']) == 2
 
 
+def test_a_record_too_short_for_slow_growth_is_no_go() -> None:
+    """Each draw is unstable without its play, but moves no five times as far within 40 s."""
+    slow, calm = (
+        ag.rths(
+            structure(factor * LAG * np.pi, rate=1024.0),
+            posterior(1e-4, ('backlash',)),
+            draws=64,
+            ground_motion='artificial',
+        )
+        for factor in (1.13, 2.0)
+    )
+    assert 0.0 < slow.growth_per_s.lower < slow.growth_per_s.upper < 1.0 / 40.0
+    assert slow.virtual is not None and slow.virtual.diverged.upper < 0.1
+    assert slow.p_unstable.value == 0.0 and slow.p_unstable.upper == 1.0
+    assert not slow.go(0.1)
+    assert '100 % of the draws do not diverge in 40 s, but are unstable' in slow.notes[0]
+    assert calm.go(0.1) and not any('diverge' in line for line in calm.notes)
+
+
 def test_a_virtual_test_shows_how_far_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
