@@ -11,6 +11,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, Unpack
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from actuator_glue.api import store
@@ -35,8 +36,11 @@ from actuator_glue.diagnosis.verdict.first_look import FirstLook
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
+from actuator_glue.hygiene.clean import initial_state
 from actuator_glue.hygiene.repeats import refuse_known
 from actuator_glue.hygiene.suspicions import suspicions
+from actuator_glue.inference.least_squares import decimate
+from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.motion import METRES, speaking, spoken
 from actuator_glue.records import Record
@@ -64,6 +68,8 @@ class Diagnosis(PosteriorModel, DiagnosisData):
         motion: what the records measure: 'm', or 'deg', 'counts' and so on, see `Record`.
         records, held: the records it was asked about, and those given as `holdout`, as they were
             given; empty after `load`.
+        fine: root of the variance that single samples have beyond the means that were fitted [m];
+            0 where samples were.
     """
 
     schema: ClassVar[str] = SCHEMA
@@ -71,6 +77,7 @@ class Diagnosis(PosteriorModel, DiagnosisData):
     motion: str = METRES
     records: tuple[Record, ...] = ()
     held: tuple[Record, ...] = ()
+    fine: float = 0.0
 
     def summary(self) -> str:
         """Return the first line for people: the verdict, and the error before and after."""
@@ -156,23 +163,30 @@ class Diagnosis(PosteriorModel, DiagnosisData):
         known = dict(self.base)
         for effect in self.effects:
             known |= effect.parameters
-        left = [
-            (t.measured - t.after)[part]
-            for t in self.traces
-            if t.held_out
-            for part in t.stretches()
-        ]
+        left = self._left()
+        if left is not None:
+            left = replace(left, sd=math.hypot(left.sd, self.fine))
         return Drawn(
             self.joint,
             self.names,
             tuple(known[n].unit if n in known else '' for n in self.names),
             self.best,
             self.model,
-            residual_of(left, len(self.names)),
+            left,
             (),
             tuple(dict.fromkeys(t.stiffness for t in self.traces)),
             () if self.complete else (self.summary(),),
         )
+
+    def _left(self) -> ResidualModel | None:
+        """Return what the model left of the held-out data, as these were fitted: of means."""
+        left = [
+            (t.measured - t.after)[part]
+            for t in self.traces
+            if t.held_out
+            for part in t.stretches()
+        ]
+        return residual_of(left, len(self.names))
 
     @property
     def inference_data(self) -> arviz.InferenceData:
@@ -198,7 +212,8 @@ class Diagnosis(PosteriorModel, DiagnosisData):
         data = az.from_dict(posterior=draws)
         groups = observed(self.traces)
         if self.records and set(self.names) == set(self.model.names):
-            groups |= predicted(self, self.drawn(), self.records, self.held)
+            of_means = replace(self.drawn(), residual=self._left())
+            groups |= predicted(self, of_means, self.records, self.held)
         data.add_groups(groups)
         data.posterior.attrs.update({k: v for k, v in self.sampler.items() if v is not None})
         known = dict(self.base)
@@ -397,22 +412,24 @@ def diagnose(
     values['doubts'] = told if found.complete else ()
     values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance(every, options.seed)
+    known = _fitted(found, given)
     return Diagnosis(
         **values,
-        tracking=_tracking(found, given),
+        tracking=_tracking(found, known, every),
+        fine=_fine(found, known),
         motion=given[0].motion,
         records=tuple(given),
         held=tuple(held),
     )
 
 
-def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTracking, ...]:
-    """Return how the augmented model follows each fitted record, under the set-up that was taken.
+def _fitted(found: DiagnosisData, records: Sequence[Record]) -> list[Record]:
+    """Return the samples of each fitted record, under the set-up that was taken.
 
-    Not where one has its own settings, nor for records that were left out.
+    None where one has its own settings; none of records that were left out.
     """
     if set(found.names) != set(found.model.names):
-        return ()
+        return []
     fitted = {of['source'] for of in found.sampling}
     cleaned = ready(records)
     if found.setup is not None and found.setup.taken:
@@ -425,5 +442,33 @@ def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTr
             else r
             for r in cleaned
         ]
-    known = [r for r in cleaned if r.source in fitted]
-    return records_tracking(found.joint, found.names, found.model, known, cleaned)
+    return [r for r in cleaned if r.source in fitted]
+
+
+def _tracking(
+    found: DiagnosisData, fitted: Sequence[Record], every: Sequence[Record]
+) -> tuple[RecordTracking, ...]:
+    """Return how the augmented model follows each fitted record, named among all records."""
+    if not fitted:
+        return ()
+    return records_tracking(found.joint, found.names, found.model, fitted, every)
+
+
+def _fine(found: DiagnosisData, fitted: Sequence[Record]) -> float:
+    """Return by how much single samples scatter beyond means, see `Diagnosis`.
+
+    What a wrong initial state or something that appeared in the middle of a record leaves is slow,
+    and in samples and means alike.
+    """
+    total, samples = 0.0, 0
+    rows = {of['source']: of for of in found.sampling}
+    for record in fitted:
+        of = rows[record.source]
+        count = round(of['rate_hz'] / of['fitted_rate_hz'])
+        moved = found.model.simulate(found.best, record, initial=initial_state(record))
+        error = np.ravel(record.measured - moved)
+        beyond = error.var() - decimate.means(error, count).var() if count > 1 else 0.0
+        if np.isfinite(beyond):
+            total += max(float(beyond), 0.0) * len(record)
+            samples += len(record)
+    return math.sqrt(total / max(samples, 1))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.api.diagnosis import _tracking
+from actuator_glue.api.diagnosis import _fitted, _tracking
 from actuator_glue.api.frequency_response import frequency_response
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
 from actuator_glue.api.tracking import record_tracking, records_tracking
@@ -67,7 +67,7 @@ def test_a_diagnosis_tells_of_the_records_it_was_fitted_to() -> None:
         setup=None,
         sampling=({'source': 'after.csv', 'fitted_rate_hz': records[1].rate / 2},),
     )
-    (told,) = _tracking(found, records)
+    (told,) = _tracking(found, _fitted(found, records), records)
     assert told.source == 'after.csv'
 
 
@@ -99,7 +99,10 @@ def test_a_calibration_and_a_diagnosis_count_the_same_samples(
         setup=None,
         sampling=({'source': given.source, 'fitted_rate_hz': 250.0},),
     )
-    (diagnosed,), (calibrated,) = _tracking(found, [given]), seen['calibrate']
+    (diagnosed,), (calibrated,) = (
+        _tracking(found, _fitted(found, [given]), [given]),
+        seen['calibrate'],
+    )
     assert source == 'a.csv' and set(diagnosed.measured) >= {'fei_delay_s', 'J1_s', 'J2'}
     assert diagnosed.measured == calibrated.measured
     assert diagnosed.predicted == calibrated.predicted
