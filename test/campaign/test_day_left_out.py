@@ -40,13 +40,13 @@ def as_one_normal(series: Series, together: Pooled, draw: int, day: int) -> tupl
 
 def test_the_other_days_tell_a_day_as_one_large_normal_does(tmp_path: Path) -> None:
     """Deviation and probability of every day, over a repair, against a dense reference."""
-    write_table(tmp_path, seed=6, days=12, jump=(5, (0.4, -0.3, 0.0, 0.0)))
+    write_table(tmp_path, seed=6, days=20, jump=(5, (0.4, -0.3, 0.0, 0.0)))
     series = series_of(read_results(tmp_path), 'north')
     changes = change_points(series)
     assert [c.place for c in changes] == [5]
     together = pooled(series, changes)
     found = left_out(series, together)
-    for day in range(12):
+    for day in range(20):
         every = [as_one_normal(series, together, h, day) for h in range(32)]
         np.testing.assert_allclose(
             found.deviation[day], np.mean([d for d, _ in every], 0), rtol=1e-3, atol=1e-5
@@ -55,25 +55,29 @@ def test_the_other_days_tell_a_day_as_one_large_normal_does(tmp_path: Path) -> N
         assert found.p_value[day] == pytest.approx(p, rel=1e-3)
 
 
-def test_days_of_an_ageing_machine_are_seldom_outliers(tmp_path: Path) -> None:
+@pytest.mark.parametrize('days', [4, 7, 24])
+def test_days_of_an_ageing_machine_are_seldom_outliers(tmp_path: Path, days: int) -> None:
     """At most one history in 20 has one by chance: above 4 of 24 once in 170 (seeds fixed)."""
     told = 0
     for seed in range(24):
-        write_table(tmp_path / str(seed), seed=seed, days=24, ageing=10.0)
+        write_table(tmp_path / str(seed), seed=seed, days=days, ageing=10.0)
         told += bool(history(tmp_path / str(seed), 'north').outliers)
     assert told <= 4
 
 
-@pytest.mark.parametrize('ageing', [1.0, 10.0])
-def test_one_day_far_off_is_told_and_no_neighbour(tmp_path: Path, ageing: float) -> None:
-    """Ten scatters of days off, in the middle: by how much, and in which parameter."""
-    write_table(tmp_path, seed=7, days=40, ageing=ageing)
+@pytest.mark.parametrize(('days', 'ageing'), [(7, 1.0), (12, 10.0), (40, 1.0), (40, 10.0)])
+def test_one_day_far_off_is_told_and_no_neighbour(
+    tmp_path: Path, days: int, ageing: float
+) -> None:
+    """In the middle: by how much, and in which parameter; of few days one of 20 scatters."""
+    write_table(tmp_path, seed=7, days=days, ageing=ageing)
+    at, off = days // 2, 10.0 if days == 40 else 20.0
     rows = read_results(tmp_path)
-    told = json.loads(rows.loc[20, 'pooling'])
-    told['mean'][0] += 10.0 * DAY[0]
-    rows.loc[20, 'pooling'] = json.dumps(told)
+    told = json.loads(rows.loc[at, 'pooling'])
+    told['mean'][0] += off * DAY[0]
+    rows.loc[at, 'pooling'] = json.dumps(told)
     (outlier,) = history(tmp_path, 'north', results=rows).outliers
-    assert outlier.day == rows.loc[20, 'day']
+    assert outlier.day == rows.loc[at, 'day']
     assert re.fullmatch(r'beta_1 \+\d+\.\d % off its level', outlier.reason)
 
 
