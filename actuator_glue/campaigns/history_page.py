@@ -35,6 +35,8 @@ _NUMBERS = (
     ('p_unstable', 'P(unstable)', 1.0),
 )
 
+_NAMED = 3  # outliers in the first lines
+
 
 def page(found: HistoryData, folder: Path) -> Page:
     """Return the page.
@@ -71,8 +73,14 @@ def lead(found: HistoryData) -> str:
         )
         one = len(found.changes) == 1
         told += f'{len(found.changes)} change{"" if one else "s"}: {listed}. '
+    elif found.outliers:
+        told += 'No change for good is seen. '
     else:
         told += 'Nothing points to a repair or a sudden fault. '
+    if found.outliers:
+        some = '; '.join(f'{o.group}: {o.reason}' for o in found.outliers[:_NAMED])
+        more = len(found.outliers) - _NAMED
+        told += f'Out of line: {some}{f"; and {more} more" if more > 0 else ""}. '
     now = [e.name for e in found.effects if e.there]
     told += f'Now there: {", ".join(now)}.' if now else 'No effect beyond the model is there now.'
     gone = [

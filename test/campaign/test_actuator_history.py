@@ -144,6 +144,9 @@ def test_a_test_far_off_is_an_outlier(tmp_path: Path) -> None:
     # By exp(0.2) - 1, to three scatters of one day.
     assert float(told[1]) == pytest.approx(22.1, abs=3.7)
     assert far.changes == ()  # one day alone may be that day's
+    first = lead(far)
+    assert 'Out of line: north/2025-03-02: verdict' in first and far.outliers[1].reason in first
+    assert 'Nothing points to' not in first
     assert far.series.left_out.keys() == {'north/2025-03-02'}
 
 
