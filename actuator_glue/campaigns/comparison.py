@@ -57,6 +57,8 @@ class DaysCompared:
         a, b: the days of each side.
         differences: of each parameter.
         different: whether the sides differ by more than days of one machine do.
+        notes: what the history says of the sides: its changes between them or within one, and
+            their days that are out of line.
     """
 
     actuator: str
@@ -64,6 +66,7 @@ class DaysCompared:
     b: tuple[str, ...]
     differences: tuple[ParameterDifference, ...]
     different: bool
+    notes: tuple[str, ...] = ()
 
     def summary(self) -> str:
         """Return the answer in one line."""
@@ -113,7 +116,26 @@ def compare(folder: Path | str, a: str, b: str, *, actuator: str | None = None) 
     days = [tuple(found.series.days[i] for i in side) for side in sides]
     # Bonferroni over the parameters.
     different = bool(p_values.min() * len(p_values) < DIFFERENT)
-    return DaysCompared(actuator, days[0], days[1], differences, different)
+    return DaysCompared(actuator, days[0], days[1], differences, different, _notes(found, sides))
+
+
+def _notes(found: ActuatorHistory, sides: Sequence[list[int]]) -> tuple[str, ...]:
+    """Return the changes between two sides or within one, and days of theirs out of line."""
+    notes = []
+    for change in found.changes:
+        parts = [{day >= change.place for day in side} for side in sides]
+        where = [f'within {name}' for name, part in zip('AB', parts, strict=True) if len(part) > 1]
+        if not where and parts[0] != parts[1]:
+            where = ['between A and B']
+        if where:
+            moved = ', '.join(change.moved) or 'no parameter alone'
+            notes.append(
+                f'the history has a change {" and ".join(where)}: {change.day} ({moved}, '
+                f'probability {change.probability:.3f})'
+            )
+    groups = {g for side in sides for day in side for g in found.series.groups[day]}
+    notes += [f'{o.group} is out of line: {o.reason}' for o in found.outliers if o.group in groups]
+    return tuple(notes)
 
 
 def _named(folder: Path | str, sides: Sequence[str]) -> str:

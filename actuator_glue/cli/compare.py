@@ -10,7 +10,7 @@ import argparse
 from dataclasses import asdict
 
 from actuator_glue.arguments import Input
-from actuator_glue.cli._output import add_json, beside, say, table
+from actuator_glue.cli._output import add_json, beside, note, say, table
 from actuator_glue.io.json_file import write_json
 
 EXAMPLES = (
@@ -46,4 +46,6 @@ def run(args: argparse.Namespace) -> int:
     say(found.summary(), args)
     title = f'{args.b} ({len(found.b)} days) over {args.a} ({len(found.a)} days)'
     table(title, HEADER, [d.row() for d in found.differences], args)
+    for line in found.notes:
+        note(line)
     return failed or (1 if found.different else 0)

@@ -204,7 +204,14 @@ def test_sides_of_a_repair_differ(repaired: Path, capsys: pytest.CaptureFixture[
     assert abs(np.log(apart.differences[0].ratio) - 0.12) < 0.03
     assert not compare(repaired, f'north/{days[1]}', days[2]).different
     assert main(['compare', str(repaired), days[30], days[45], '--actuator', 'north']) == 1
-    assert 'another machine: beta_1 +' in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert 'another machine: beta_1 +' in said.out
+    (change,) = history(repaired, 'north').changes
+    told = f'{change.day} (beta_1, alpha_1_beta_0, probability 1.000)'
+    assert f'a change between A and B: {told}' in said.err.replace('\n', ' ')
+    mixed = compare(repaired, f'{days[30]}:{days[40]}', days[45])
+    assert mixed.notes == (f'the history has a change within A: {told}',)
+    assert compare(repaired, days[1], days[2]).notes == ()
     with pytest.raises(ag.InputError, match='no such test and no day'):
         compare(repaired, '1999-01-01', days[0])
 
