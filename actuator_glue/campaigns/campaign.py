@@ -35,6 +35,7 @@ ANALYSIS = 'actuator_glue.campaigns.analysis:analysed'
 _AHEAD = 8
 # How often the number of workers is asked for [s].
 _RECOUNT = 5.0
+_GONE = 'the scheduler has gone, with what its workers had in hand'
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +139,10 @@ def _write_provenance(
     write_json(content, str(folder / 'campaign.json'))
 
 
+class _EndedError(InputError):
+    """The scheduler has ended before the campaign; rows that were made are there."""
+
+
 @dataclass(frozen=True, slots=True)
 class _CampaignRun:
     rows: RowFolder
@@ -168,10 +173,18 @@ class _CampaignRun:
         with ProgressFile(self.rows.folder, begin, self.tell) as told:
             if left:
                 count = None if workers is None else min(workers, len(left))
-                with connected(scheduler, count) as client:
-                    suspects = self._compute(client, left, keys, told)
-                    # Whatever ended their workers was one of those there: now each is by itself.
-                    self._compute(client, suspects, keys, told, alone=True)
+                try:
+                    with connected(scheduler, count) as client:
+                        suspects = self._compute(client, left, keys, told)
+                        # Whatever ended their workers was one of those: now each is by itself.
+                        self._compute(client, suspects, keys, told, alone=True)
+                except _EndedError as error:
+                    self.rows.gather(keys)
+                    raise InputError(
+                        f'{error}; {told.now.done} of {told.now.total} groups have their rows, '
+                        f'which {self.rows.folder / RESULTS} holds: run the same command again, '
+                        'and it makes the others'
+                    ) from error
             table = self.rows.gather(keys)
         return CampaignResult(self.rows.folder, told.now, table)
 
@@ -194,7 +207,7 @@ class _CampaignRun:
         room, counted, following = 0, -math.inf, 0
         while following < len(tasks) or flying:
             if time.monotonic() - counted > _RECOUNT:
-                threads = max(sum(client.nthreads().values()), 1)
+                threads = _threads(client)
                 room, counted = 1 if alone else _AHEAD * threads, time.monotonic()
             if following < len(tasks) and len(flying) <= room // 2:
                 new = tasks[following : following + room - len(flying)]
@@ -241,13 +254,11 @@ class _CampaignRun:
         """Check that a task without a result is one that no worker outlived.
 
         Raises:
-            InputError: the scheduler has gone, or a worker cannot write to the folder.
+            _EndedError: the scheduler has gone.
+            InputError: a worker cannot write to the folder.
         """
         if future.status != 'error':
-            raise InputError(
-                'the scheduler has gone, with what its workers had in hand; rows that were made '
-                'are kept: run the same command again'
-            )
+            raise _EndedError(_GONE)
         error = future.exception()
         if type(error).__name__ != 'KilledWorker':
             raise InputError(
@@ -262,6 +273,18 @@ class _CampaignRun:
         found = {'failure': 'every worker that was given it ended'}
         self.rows.write(key, row_of(task, key, hashes, found, 0.0))
         return key, True, True
+
+
+def _threads(client: Any) -> int:
+    """Return how many threads the workers have, one at least.
+
+    Raises:
+        _EndedError: the scheduler has gone.
+    """
+    try:
+        return max(sum(map(int, client.nthreads().values())), 1)
+    except OSError as error:
+        raise _EndedError(_GONE) from error
 
 
 def _ended(queue: SimpleQueue[Any]) -> list[Any]:

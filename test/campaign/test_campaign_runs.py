@@ -129,6 +129,31 @@ def test_a_killed_worker_and_a_killed_client_cost_no_row(
     )
 
 
+def test_a_scheduler_that_goes_leaves_a_table_and_says_how_to_go_on(
+    start: Start, tmp_path: Path
+) -> None:
+    """How many groups have their rows, and where; the same call makes the others."""
+    place, out, folder = tmp_path / 'scheduler.json', tmp_path / 'out', tmp_path / 'files'
+    folder.mkdir()
+    for number in range(4):
+        (folder / f'{number}.csv').write_text(f'sleep {0.1 if number < 2 else 60} {number}')
+    options = ('--host', '127.0.0.1', '--port', '0', '--no-dashboard')
+    module = 'distributed.cli.dask_scheduler'
+    process = start('-m', module, '--scheduler-file', place, *options)
+    until(lambda: place.exists() and place.read_text('utf-8').endswith('}'))
+    address = str(json.loads(place.read_text('utf-8'))['address'])
+    add_worker(start, address)
+
+    def end(now: Progress) -> None:
+        if now.computed >= 2:
+            process.kill()
+
+    with pytest.raises(ag.InputError, match='2 of 4 groups have their rows') as told:
+        ag.campaign(folder, out, scheduler=address, analysis=ANALYSIS, progress=end)
+    assert f'{out / "results.parquet"} holds: run the same command again' in str(told.value)
+    assert sorted(read_results(out)['group']) == ['0.csv', '1.csv']
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_record_that_kills_workers_costs_itself_alone(records: Path, tmp_path: Path) -> None:
