@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
-from actuator_glue.diagnosis.telling.response import amplitude_of, harmonic
+from actuator_glue.diagnosis.telling.response import amplitude_of, harmonic, near, phases
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
@@ -198,15 +198,13 @@ def _sines(
         return {}
     table = _some(draws, names, structure, _ANSWERS)
     out = {}
-    for hertz in FREQUENCIES:
+    whole = phases(structure, np.median(table, axis=0), sizes, FREQUENCIES, stiffness)
+    for hertz, turned in zip(FREQUENCIES, whole, strict=True):
         size = amplitude_of(sizes, hertz)
         answer = harmonic(structure, table, size, hertz, stiffness)
         answer = answer[np.isfinite(answer)]
-        if len(answer):
-            lag = -np.angle(answer)
-            # No delay is negative by more than a quarter of a turn, nor are two draws' far apart.
-            lag += 2.0 * np.pi * (np.median(lag) < -0.5 * np.pi)
-            lag = np.median(lag) + np.angle(np.exp(1j * (lag - np.median(lag))))
+        if len(answer) and np.isfinite(turned):
+            lag = -near(np.angle(answer), turned)
             out[f'delay_at_{hertz:g}_hz_s'] = spread(lag / (2.0 * np.pi * hertz))
             out[f'amplitude_at_{hertz:g}_hz'] = spread(np.abs(answer))
     return out

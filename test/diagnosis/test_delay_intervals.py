@@ -125,6 +125,23 @@ def test_the_delay_of_play_is_that_of_sines_as_large_as_the_test() -> None:
         assert sine.delay == pytest.approx(told.median, abs=1e-9)
 
 
+@pytest.mark.parametrize('late', [0.02, 0.06, 0.15])
+def test_a_delay_of_more_than_a_turn_is_told_whole(late: float) -> None:
+    """Play and a transport delay: as much later as that, by up to two turns at 10 Hz."""
+    structure, play = Structure(('delay', 'backlash')), [8e-5]
+    records = sweeps(structure, np.array([*TABLE_2, 0.0, *play]), np.random.default_rng(3), 10.0)
+    found = []
+    for delay in (0.0, late):
+        theta = np.array([*TABLE_2, delay, *play])
+        of = [response.of(structure, theta, theta[None], scale(records, theta), 250e3)]
+        several = records_tracking(np.tile(theta, (8, 1)), structure.names, structure, records)
+        told = several[1].predicted
+        sines = {s.frequency: s.delay for s in of[0].sines}
+        found.append([told[f'delay_at_{f:g}_hz_s'].median for f in (1.0, 5.0, 10.0)])
+        assert found[-1] == pytest.approx([sines[f] for f in (1.0, 5.0, 10.0)], abs=1e-6)
+    assert np.subtract(*found[::-1]) == pytest.approx([late] * 3, abs=2e-5)
+
+
 def test_intervals_of_delay_hold_it(rng_seed: int) -> None:
     """Four machines: fewer than four of eight intervals hold it once in 2000 runs at most.
 

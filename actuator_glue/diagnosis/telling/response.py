@@ -7,9 +7,12 @@ reached at that frequency, and the first harmonic of what comes out (describing 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import Json, json_value
@@ -101,15 +104,12 @@ def of(model: Model, theta: Array, draws: Array, scale: Scale, stiffness: float)
         stiffness: of the specimen [N/m].
     """
     table = np.concatenate([theta[None], draws])
+    whole = phases(model, theta, scale, FREQUENCIES, stiffness)
     sines = []
-    for hertz in FREQUENCIES:
+    for hertz, turned in zip(FREQUENCIES, whole, strict=True):
         size = amplitude_of(scale, hertz)
         answer = harmonic(model, table, size, hertz, stiffness)
-        gain, phase = np.abs(answer), np.angle(answer)
-        # Draws' phases differ from the best parameters' by less than half a turn.
-        phase = phase[0] + np.angle(np.exp(1j * (phase - phase[0])))
-        if phase[0] > 0.5 * math.pi:
-            phase = phase - 2.0 * math.pi
+        gain, phase = np.abs(answer), near(np.angle(answer), turned)
         turns = np.degrees(phase)
         delay = -phase / (2.0 * math.pi * hertz)
         sines.append(
@@ -131,6 +131,42 @@ def _interval(values: Array) -> tuple[float, float]:
 def amplitude_of(scale: Scale, hertz: float) -> float:
     """Return the largest amplitude of a sine within the stroke and speed of a test [m]."""
     return min(scale.stroke, scale.velocity / (2.0 * math.pi * hertz))
+
+
+def phases(
+    model: Model, theta: Array, scale: Scale, frequencies: Sequence[float], stiffness: float
+) -> list[float]:
+    """Return the phase (lead) of a model's sines with all its turns [rad].
+
+    Up a ladder of frequencies from 1 Hz or the lowest asked for, where no actuator is late by
+    three quarters of a turn: from one rung to the next a delay turns the phase in proportion to
+    frequency, and what else there is by less than half a turn.
+
+    Args:
+        model: Eq. (2) with effects.
+        theta: parameters (p,).
+        scale: stroke and speed of the test.
+        frequencies: ascending [Hz].
+        stiffness: of the specimen [N/m].
+    """
+    low = min(FREQUENCIES[0], *frequencies)
+    rungs = np.geomspace(
+        low, frequencies[-1], 1 + math.ceil(4.0 * math.log(frequencies[-1] / low))
+    )
+    ladder = sorted({*map(float, rungs), *frequencies})
+    found: dict[float, float] = {}
+    expected = -0.5 * math.pi
+    for hertz, after in zip(ladder, [*ladder[1:], ladder[-1]], strict=True):
+        size = amplitude_of(scale, hertz)
+        angle = np.angle(harmonic(model, theta[None], size, hertz, stiffness))
+        found[hertz] = float(near(angle, expected)[0])
+        expected = found[hertz] * after / hertz
+    return [found[hertz] for hertz in frequencies]
+
+
+def near(angles: NDArray[Any], expected: float) -> Array:
+    """Return angles less than half a turn from an expected one, whole turns added [rad]."""
+    return np.asarray(expected + np.angle(np.exp(1j * (angles - expected))))
 
 
 def harmonic(model: Model, table: Array, size: float, hertz: float, stiffness: float) -> Array:
