@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 
+from actuator_glue.api import options
 from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.effect_cost import effect_costs, margins
 from actuator_glue.api.given import seed_given
+from actuator_glue.api.options import takes
 from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.api.stability_data import AtFrequency, DelayMargin
@@ -37,6 +40,26 @@ FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 DRAWS = 1000
 
 
+@dataclass(frozen=True, slots=True)
+class Showing:
+    """How a hybrid test shows how far it is.
+
+    Attributes:
+        progress: called with the share of the virtual test that is done, in (0, 1]; True for a
+            bar, False for none; None for a bar in a notebook only. A callback that fails is not
+            called again.
+    """
+
+    progress: Callable[[float], object] | bool | None = None
+
+
+class ShowingChanges(TypedDict, total=False):
+    """The same by name, for type checkers."""
+
+    progress: Callable[[float], object] | bool | None
+
+
+@takes(Showing)
 def rths(
     partition: Partition | Path | str,
     calibration: Calibration | Path | str,
@@ -47,7 +70,7 @@ def rths(
     ground_motion: GroundMotion | Path | str | None = None,
     criteria: Mapping[str, float] | None = None,
     seed: int | None = 1,
-    progress: Callable[[float], object] | bool | None = None,
+    **changes: Unpack[ShowingChanges],
 ) -> StabilityResult:
     """Return how likely a hybrid test is unstable with a calibrated actuator.
 
@@ -68,9 +91,7 @@ def rths(
             'force' of the specimen [N].
         seed: of the specimen's draws, where the partition gives it standard deviations, and of
             the sensors' noise; None for a fresh one, which the result says.
-        progress: called with the share of the virtual test that is done, in (0, 1]; True for a
-            bar, False for none; None for a bar in a notebook only. A callback that fails is not
-            called again.
+        changes: how far it is.
 
     Raises:
         InputError: a partition, posterior or option that cannot be used.
@@ -79,6 +100,7 @@ def rths(
         >>> found = rths('benchmark_case_1', posterior)  # doctest: +SKIP
         >>> found.p_unstable.upper  # doctest: +SKIP
     """
+    asked = options.chosen(Showing(), changes, 'rths')
     seed, draws = seed_given(seed), whole(draws, 'draws')
     calibration = calibration_given(calibration)
     frequencies = [number(f, 'frequencies') for f in np.ravel(np.asarray(frequencies, object))]
@@ -110,7 +132,7 @@ def rths(
             partition, loop.draws, loop.names, loop.effects, specimen, chosen, ground, seed
         )
         motion = ground_motion.name, ground_motion.duration
-        with shown('virtual test', 1.0, progress) as done:
+        with shown('virtual test', 1.0, asked.progress) as done:
             responses = run(test, done)
         virtual = summarise(responses, test.time, motion, criteria, effective)
     margin, growth = margins(loop, chosen)
