@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_glue.api.given import seed_given
 from actuator_glue.campaigns.change_points import change_points
 from actuator_glue.campaigns.day_left_out import left_out
 from actuator_glue.campaigns.effect_spells import effect_histories
@@ -16,6 +17,8 @@ from actuator_glue.campaigns.pooling import Pooled, pooled
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import Series, problems_of, series_of, tests_of
 from actuator_glue.diagnosis.verdicts import COMPLETE
+from actuator_glue.errors import InputError
+from actuator_glue.given import number
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -55,12 +58,16 @@ def history(
         folder: of the campaign.
         actuator: its name.
         ahead: days from the last test to the next one; None for as many as between tests so far.
-        seed: of the draws.
+        seed: of the draws, 0 or more.
         results: the campaign's table where it has been read.
 
     Raises:
-        InputError: no campaign there, or no test of this actuator with a day and numbers.
+        InputError: no campaign there, no test of this actuator with a day and numbers, or a time
+            or seed below zero.
     """
+    seed = seed_given(seed)
+    if ahead is not None and not 0.0 <= number(ahead, 'ahead') < np.inf:
+        raise InputError(f'ahead is {ahead:g} days; give the days to the next test, 0 or more')
     table = tests_of(read_results(folder) if results is None else results, actuator)
     series = series_of(table, actuator)
     changes = change_points(series)

@@ -47,12 +47,14 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: no campaign there, no such actuator, or a folder that cannot be written.
     """
+    from actuator_glue.api.given import seed_given
     from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
     from actuator_glue.campaigns.history_page import lead
     from actuator_glue.campaigns.rows import read_results
     from actuator_glue.campaigns.series import actuators_of
     from actuator_glue.report.quantity import said
 
+    seed_given(args.seed)  # one that is wrong is wrong of every actuator
     results = read_results(args.folder)
     names = [args.actuator] if args.actuator else actuators_of(results)
     if not names:

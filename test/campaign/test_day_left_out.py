@@ -9,6 +9,7 @@ import pytest
 from laboratory_table import DAY, write_table
 from scipy.stats import chi2
 
+import actuator_glue as ag
 from actuator_glue.campaigns.actuator_history import history
 from actuator_glue.campaigns.change_points import change_points
 from actuator_glue.campaigns.day_left_out import left_out
@@ -16,6 +17,7 @@ from actuator_glue.campaigns.day_model import JUMP
 from actuator_glue.campaigns.pooling import Pooled, pooled
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import Series, series_of
+from actuator_glue.cli.main import main
 
 
 def as_one_normal(series: Series, together: Pooled, draw: int, day: int) -> tuple[np.ndarray, ...]:
@@ -79,6 +81,19 @@ def test_one_day_far_off_is_told_and_no_neighbour(
     (outlier,) = history(tmp_path, 'north', results=rows).outliers
     assert outlier.day == rows.loc[at, 'day']
     assert re.fullmatch(r'beta_1 \+\d+\.\d % off its level', outlier.reason)
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'told'), [({'seed': -4}, 'seed -4'), ({'ahead': -1.0}, 'ahead is -1 days')]
+)
+def test_impossible_options_of_a_history_are_refused(
+    tmp_path: Path, wrong: dict[str, float], told: str
+) -> None:
+    """By the call; by the command with exit code 2."""
+    write_table(tmp_path, seed=8, days=3)
+    with pytest.raises(ag.InputError, match=told):
+        history(tmp_path, 'north', **wrong)
+    assert main(['history', str(tmp_path), '--seed', '-4']) == 2
 
 
 def test_a_single_day_is_no_outlier(tmp_path: Path) -> None:
