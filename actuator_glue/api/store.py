@@ -60,6 +60,7 @@ def load(path: Path | str, schema: str, cls: type[T]) -> T:
         InputError: no path, the file cannot be read, or holds something else.
     """
     path = given_path(path)
+    _check_kind(path, schema)
     try:
         with np.load(path, allow_pickle=False) as file:
             content = json.loads(str(file[_CONTENT]))
@@ -74,6 +75,16 @@ def load(path: Path | str, schema: str, cls: type[T]) -> T:
         raise InputError(f'{path}: holds no {schema} ({error})') from error
 
 
+def _check_kind(path: Path, what: str) -> None:
+    """Refuse what is no .npz file: numpy would say how to load it unsafely.
+
+    Raises:
+        InputError: a file of another kind.
+    """
+    if path.is_file() and not zipfile.is_zipfile(path):
+        raise InputError(f'{path}: holds no {what}: it is no .npz file, or a damaged one')
+
+
 def schema_of(path: Path | str) -> str:
     """Return what a file that `save` wrote holds.
 
@@ -81,6 +92,7 @@ def schema_of(path: Path | str) -> str:
         InputError: no path, the file cannot be read, or holds nothing of ours.
     """
     path = given_path(path)
+    _check_kind(path, 'result of actuator_glue')
     try:
         with np.load(path, allow_pickle=False) as file:
             return str(json.loads(str(file[_CONTENT]))['schema'])

@@ -319,3 +319,12 @@ def test_a_file_of_broken_arrays_is_refused(
     path = store.save(tmp_path / 'posterior.npz', broken.schema, broken)
     with pytest.raises(ag.InputError, match=rf'posterior\.npz: array {array}.* {told}'):
         ag.Calibration.load(path)
+
+
+def test_what_is_no_posterior_is_refused_without_advice_to_trust_it(tmp_path: Path) -> None:
+    """A file of another kind, as the JSON of the same result."""
+    other = tmp_path / 'found.json'
+    other.write_text('{}')
+    with pytest.raises(ag.InputError, match='it is no') as told:
+        ag.Calibration.load(other)
+    assert 'pickle' not in str(told.value)
