@@ -60,10 +60,12 @@ def check_levels(levels: ArrayLike) -> Array:
     """Return band levels as an array of shape (L,).
 
     Raises:
-        InputError: a level is not between 0 and 1.
+        InputError: no level, or one that is not between 0 and 1.
     """
     checked = np.atleast_1d(np.asarray(levels, dtype=np.float64))
-    if checked.ndim != 1 or not checked.size or not ((checked > 0) & (checked < 1)).all():
+    if not checked.size:
+        raise InputError('no band level is given; give one between 0 and 1, as 0.95')
+    if checked.ndim != 1 or not ((checked > 0) & (checked < 1)).all():
         raise InputError(f'band levels must lie between 0 and 1, got {levels!r}')
     return checked
 

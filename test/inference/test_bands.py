@@ -37,6 +37,7 @@ def test_columns_taken_in_blocks_change_nothing() -> None:
         (np.zeros((1, 5)), {}, 'two draws'),
         (np.array([[0.0], [np.nan]]), {}, 'draw 1 is not finite'),
         (np.zeros((3, 2)), {'levels': [95.0]}, 'between 0 and 1'),
+        (np.zeros((3, 2)), {'levels': []}, 'no band level is given'),
     ],
 )
 def test_unusable_input_says_what_is_wrong(draws, keywords, says) -> None:
