@@ -355,18 +355,18 @@ class Refits:
     def _wanted(self, asked: Asked) -> list[tuple[Trial, str, bool]]:
         """Return what is refitted: the structure, a further effect, whether briefly.
 
-        An effect whose signature promises far less than is of use, or than another one's, is left
-        out; where every one is listed, it is refitted briefly. Where far more structure remains
-        than is of use, and no signature promises any of that, they say nothing: each is refitted.
+        An effect whose signature promises far less than another one's is left out, or than is of
+        use where that is much of the structure that remains; where every one is listed, it is
+        refitted briefly.
         """
         current = asked.current
         names = [n for n in asked.names if n not in current.effects]
         shares = list(self.each(lambda n: self.promises.share(current, n), names))
         use = max(0.0, 1.0 - asked.below / current.mean_square)
+        if max(shares, default=0.0) < use < self._structure(current.fit) / UNDERSTATED:
+            use = 0.0
         least = max([use, *shares]) / UNDERSTATED
         shares = list(self.each(lambda n: self.promises.share(current, n, least), names))
-        if max(shares, default=0.0) < least and self._structure(current.fit) > UNDERSTATED * use:
-            least = 0.0
         far = {n for n, s in zip(names, shares, strict=True) if s < least and n != FEEDBACK}
         return [(current, n, n in far) for n in names if asked.every or n not in far]
 
