@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.bands import check_levels
 from actuator_glue.inference.carried import Drift
 
 Likelihood: TypeAlias = Literal['glue', 'gaussian']
@@ -120,9 +121,7 @@ class EstimatorSettings:
                     f'{name} = {value:g} is outside [{limit.lower:g}, {limit.upper:g}] '
                     f'{limit.unit} ({limit.meaning})'
                 )
-        object.__setattr__(self, 'levels', tuple(float(level) for level in self.levels))
-        if not self.levels or not all(0.0 < level < 1.0 for level in self.levels):
-            raise InputError(f'levels {self.levels} must lie between 0 and 1')
+        object.__setattr__(self, 'levels', tuple(check_levels(self.levels).tolist()))
         if list(self.levels) != sorted(set(self.levels)):
             raise InputError(f'levels {self.levels} must ascend')
         for name, known in CHOICES.items():

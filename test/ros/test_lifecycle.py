@@ -107,7 +107,7 @@ def test_the_parameter_file_is_the_code_s():
         ('lab_bridge', {'specimen_stiffness': -0.5}, 'is negative'),
         ('replay', {'bag': 'no-such'}, 'neither a bag nor an .mcap'),
         ('recorder', {'bag': '/proc/none'}, 'cannot'),
-        ('estimator', {'levels': []}, 'levels () must lie between 0 and 1'),
+        ('estimator', {'levels': []}, 'no band level is given'),
         ('estimator', {'tracking_frequencies': [-1.0, math.nan]}, 'must be positive and finite'),
         ('estimator', {'tracking_frequencies': [5.0, math.inf]}, 'must be positive and finite'),
         ('estimator', {'tracking_frequencies': []}, 'give at least one'),
