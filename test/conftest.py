@@ -11,6 +11,18 @@ import pytest
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
+from hypothesis import HealthCheck, settings
+
+# How long an example takes says how busy a computer is, and which kernels it compiles. The same
+# examples every time: `--hypothesis-profile default` looks for new ones.
+settings.register_profile(
+    'same',
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile('same')
 
 # A folder to write to, then a command: everything else is read-only, and nobody has a home.
 READ_ONLY = r"""
