@@ -42,9 +42,11 @@ class Stop:
         self._reader, writer = socket.socketpair()
         writer.setblocking(False)
         self._writer = writer
+        # First what hears a signal, then what keeps it from ending the process: in the other order
+        # one that came between the two would be lost.
+        signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: None)
-        signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
         threading.Thread(target=self._listen, name='signals', daemon=True).start()
 
     def is_set(self) -> bool:

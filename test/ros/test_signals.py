@@ -40,22 +40,70 @@ def test_a_doubled_signal_leaves_the_bag_whole(start, probe, tmp_path):
     assert np.array_equal(recorded(bag), np.arange(100_000))
 
 
-def test_a_second_signal_ends_a_node_that_hangs(tmp_path):
-    text = (
-        'import sys, time\n'
-        'from actuator_glue.nodes.signals import Stop\n'
-        'stop = Stop()\n'
-        'print("ready", flush=True)\n'
-        'time.sleep(60)\n'
+# Hangs; the time at which each signal is noticed is given, and printed when it is looked at.
+HANGS = """
+import sys, time
+from types import SimpleNamespace
+from actuator_glue.nodes import signals
+
+times = iter(map(float, sys.argv[1:]))
+
+def now():
+    found = next(times)
+    print(found, flush=True)
+    return found
+
+signals.time = SimpleNamespace(monotonic=now)
+stop = signals.Stop()
+print('ready', flush=True)
+time.sleep(300)
+"""
+
+
+def test_a_second_signal_ends_a_node_that_hangs():
+    """One that comes within a second is a repetition of the first."""
+    times = ['10.0', '10.1', '11.0', '11.1']
+    process = subprocess.Popen(
+        [sys.executable, '-c', HANGS, *times], stdout=subprocess.PIPE, text=True
     )
-    process = subprocess.Popen([sys.executable, '-c', text], stdout=subprocess.PIPE)
-    assert process.stdout.readline() == b'ready\n'
-    for pause in (0.1, 1.2):
-        process.send_signal(signal.SIGINT)
-        time.sleep(pause)
+    assert process.stdout.readline() == 'ready\n'
+    for time in times:
         assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    assert process.wait(30.0) == 130
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == f'{time}\n'
+    assert process.wait(60.0) == 130
+
+
+# A signal comes between any two steps that take signals over.
+EARLY = """
+import os, signal, sys
+from actuator_glue.nodes import signals
+
+signals.end_at_once()
+step, steps, real = int(sys.argv[1]), 0, (signal.signal, signal.set_wakeup_fd)
+
+def then_a_signal(do):
+    def call(*args, **given):
+        global steps
+        found = do(*args, **given)
+        steps += 1
+        if steps == step:
+            os.kill(os.getpid(), signal.SIGINT)
+        return found
+    return call
+
+signal.signal, signal.set_wakeup_fd = map(then_a_signal, real)
+stop = signals.Stop()
+assert steps == 3 and stop._event.wait(60.0), 'the signal was lost'
+"""
+
+
+@pytest.mark.parametrize('step', [1, 2, 3])
+def test_no_signal_is_lost_while_a_node_takes_them_over(step):
+    done = subprocess.run(
+        [sys.executable, '-c', EARLY, str(step)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize('after', [0.3, 0.6, 1.2])
@@ -81,7 +129,7 @@ def test_an_early_signal_ends_a_node_without_a_traceback(after, tmp_path):
     time.sleep(after)
     for _ in range(2):
         os.killpg(process.pid, signal.SIGINT)
-    told, _ = process.communicate(timeout=20)
+    told, _ = process.communicate(timeout=120)
     assert process.returncode == 0 and 'Traceback' not in told, told
 
 
