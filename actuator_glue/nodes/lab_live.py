@@ -111,11 +111,9 @@ class LiveSource:
         """Yield what has arrived, for ever."""
         self._reception = self._fresh()
         self._announce()
-        self._node.introduce()
-        # Samples that came while nobody was ready belong to the time before the stream.
+        # Before it is said that the stream begins: a program that waits for that sends at once.
+        self._node.introduce(self._drain)
         last = time.monotonic()
-        while self._listener.receive(0.0) and time.monotonic() - last < SILENT:
-            pass
         while True:
             batches = self._listener.receive(0.1)
             now = time.monotonic()
@@ -130,6 +128,12 @@ class LiveSource:
             yield Step(0.0, partial(self._publish, found))
             if batches:
                 time.sleep(self._pause)
+
+    def _drain(self) -> None:
+        """Let go of samples that came while nobody was ready: they belong to the time before."""
+        began = time.monotonic()
+        while self._listener.receive(0.0) and time.monotonic() - began < SILENT:
+            pass
 
     def report(self) -> dict[str, Any]:
         """Return counts, offset and skew of the sender's clock; tell of a wrong rate."""

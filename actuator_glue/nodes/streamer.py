@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from rclpy.duration import Duration
@@ -106,15 +106,19 @@ class Streamer(base.SuiteNode):
                 self.get_logger().info(f'waiting for {missing}')
         return not missing
 
-    def introduce(self) -> None:
+    def introduce(self, prepare: Callable[[], None] = lambda: None) -> None:
         """Wait until whoever was waited for has the first test set-up; call it in the stream.
 
         That our publisher has met a subscriber says nothing of the other way round: DDS may yet
         have to tell the subscriber, who misses what is sent until then. It is told of publishers
         in the order they were made, and that of samples comes before that of set-ups.
+
+        Args:
+            prepare: the last thing to do before it is said that the stream begins.
         """
         if self.parameters['wait_for']:
             self._wait_until_taken(self._setup_out)
+        prepare()
         if not self._introduced:
             # Not before: a program that waits for this line sends at once.
             self.get_logger().info('the stream begins')

@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 
-from actuator_glue.io.bag_reader import decoded
+from actuator_glue.io.bag_reader import decoded, refuse
 
 RATE = 200.0
 # Estimator settings for short tests at RATE.
@@ -134,6 +134,19 @@ class Probe(Node):
         while time.monotonic() < end:
             rclpy.spin_once(self, timeout_sec=0.02)
 
+    def until_recorded(self, bag, samples):
+        """Spin until so many samples are in the file of a bag being written.
+
+        A recorder that ends writes what has reached it. What has not by then is lost, and on a
+        busy computer the last blocks may take a while.
+        """
+
+        def there():
+            self.for_a_while(0.1)
+            return len(recorded(bag, lambda _: None)) >= samples
+
+        self.until(there, 60, f'{samples} samples in {bag}')
+
     def value(self, node, key, default=None):
         """What a node last said under a key of /diagnostics."""
         return self.health.get(node, {}).get(key, default)
@@ -237,10 +250,11 @@ class Probe(Node):
             self.for_a_while(pause)
 
 
-def recorded(bag):
-    """Running indices of all samples in a bag."""
-    blocks = [(m.index, len(m.command)) for _, m in decoded(bag, ('SampleBlock',))]
-    return np.concatenate([np.arange(i, i + n) for i, n in blocks])
+def recorded(bag, note=refuse):
+    """Running indices of all samples in a bag; told of damage, which one being written has."""
+    blocks = decoded(bag, ('SampleBlock',), note=note)
+    parts = [np.arange(m.index, m.index + len(m.command)) for _, m in blocks]
+    return np.concatenate([np.arange(0), *parts])
 
 
 @contextmanager

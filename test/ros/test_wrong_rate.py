@@ -48,7 +48,6 @@ def test_a_bridge_that_is_told_half_the_rate_says_so(layout, start, probe, tmp_p
         wait_for=1,
     )
     probe.until(lambda: 'the stream begins' in bridge.text, 200, 'estimator compiled')
-    probe.for_a_while(0.5)
     sender = send(given, at, *(['--layout', str(layout)] if layout else []))
     probe.until(lambda: probe.number('lab_bridge', 'samples') == len(record), 60, 'all samples')
     probe.for_a_while(1.5)
