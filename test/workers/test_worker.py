@@ -103,7 +103,43 @@ def test_it_is_closed_twice_or_before_it_has_begun(answers):
     process = worker._process
     worker.close(patience=0.0)
     worker.close()
-    assert process.wait(5.0) is not None and not answers
+    assert process.wait(60.0) is not None and not answers
+
+
+ORPHAN = """
+import time
+from functools import partial
+from actuator_glue.workers.worker import Worker
+worker = Worker(print, partial(time.sleep, %s))
+worker.submit(time.sleep, 600.0)
+print(worker._process.pid, %s or worker.ready.wait(60.0), flush=True)
+time.sleep(600.0)
+"""
+
+
+@pytest.mark.parametrize('warm', [600.0, 0.0])
+def test_it_ends_with_who_asks_whatever_it_does(warm):
+    """One that has yet to compile went on for minutes."""
+    script = ORPHAN % (warm, warm)
+    asking = subprocess.Popen(
+        [sys.executable, '-c', script], stdout=subprocess.PIPE, text=True, bufsize=1
+    )
+    pid, ready = asking.stdout.readline().split()
+    assert ready != 'False'
+    os.kill(asking.pid, signal.SIGKILL)
+    asking.wait()
+    end = time.monotonic() + 60.0
+    while Path(f'/proc/{pid}').exists() and 'Z' not in state(pid):
+        assert time.monotonic() < end, 'it is still there'
+        time.sleep(0.02)
+
+
+def state(pid):
+    """Return what a process does, `Z` where it has ended."""
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
+    except OSError:
+        return 'Z'
 
 
 SCRIPT = """
