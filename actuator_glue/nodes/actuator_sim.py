@@ -178,10 +178,12 @@ class SimulatorNode(streamer.Streamer):
             # A block can be published when its last sample has been taken.
             yield Step((self._index + len(block)) / rate, partial(self._publish, block))
 
-    def _start_clock(self) -> None:
+    def _start_clock(self, taken: int = 0) -> None:
+        """Have the next samples stamped by the clock as it is now: so many have been taken."""
         self._clock_changed = False
-        now = self.get_clock().now().nanoseconds
-        self.out.begin(self._values['actuator'], 1.0 / self._values['rate'], now, self._index)
+        period = 1.0 / self._values['rate']
+        start = self.get_clock().now().nanoseconds - round(1e9 * taken * period)
+        self.out.begin(self._values['actuator'], period, start, self._index)
 
     def _renew(self) -> None:
         self._renewed = False
@@ -190,7 +192,7 @@ class SimulatorNode(streamer.Streamer):
 
     def _publish(self, command: Array) -> None:
         if self._clock_changed:
-            self._start_clock()
+            self._start_clock(len(command))
         if self._renewed:
             self._renew()
             self._announce()

@@ -90,14 +90,15 @@ class FileSource:
             due = offset + stop * record.period
             yield Step(due, partial(self._publish, record, start, stop, ahead))
 
-    def _start_clock(self, record: Record, index: int) -> None:
+    def _start_clock(self, record: Record, index: int, taken: int = 0) -> None:
+        """Have the next samples stamped by the clock as it is now: so many have been taken."""
         self._clock_changed = False
-        now = self._node.get_clock().now().nanoseconds
-        self._out.begin(record.actuator, record.period, now, index)
+        start = self._node.get_clock().now().nanoseconds - round(1e9 * taken * record.period)
+        self._out.begin(record.actuator, record.period, start, index)
 
     def _publish(self, record: Record, start: int, stop: int, ahead: int) -> None:
         if self._clock_changed:
-            self._start_clock(record, record.first_index + start)
+            self._start_clock(record, record.first_index + start, stop - start)
         first = 0 if start == 0 else min(start + ahead, len(record))
         last = min(stop + ahead, len(record))
         if ahead and last > first:

@@ -1,6 +1,9 @@
 """use_sim_time: a /clock that runs, stands still and jumps; the streams keep to it."""
 
+import threading
 import time
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +13,10 @@ from rclpy.qos import QoSProfile
 from ros_nodes import RATE, Timekeeper, recorded
 
 from actuator_glue.io.bag_reader import decoded, messages
+from actuator_glue.nodes import actuator_sim, lab_file
+from actuator_glue.nodes.health import Rate
 from actuator_glue.nodes.pacer import Pacer, Step
+from actuator_glue.records import Record
 
 BLOCK = 10 / RATE  # what one message holds [s]
 
@@ -76,6 +82,35 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
     assert process.alive and process.end() == 0, process.text
 
 
+class Blocks:
+    """Where a stream's samples go: the start of its clock and the samples that follow it."""
+
+    def __init__(self):
+        self.start = self.samples = lambda *_: None
+
+    def begin(self, actuator, period, start_ns, first_index=0):
+        self.start = start_ns, first_index
+
+
+def test_after_a_jump_the_last_sample_of_a_block_is_the_newest():
+    """A block leaves when its last sample has been taken; stamps began at its first one."""
+    now = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=10**12))
+    plant = SimpleNamespace(step=lambda command: (command, command))
+    simulator = SimpleNamespace(
+        get_clock=lambda: now, out=Blocks(), plant=plant, samples=Rate(), _index=40
+    )
+    simulator._values = {'rate': RATE, 'actuator': 'rig'}
+    simulator._clock_changed, simulator._renewed = True, False
+    simulator._publish_preview = lambda: None
+    simulator._start_clock = partial(actuator_sim.SimulatorNode._start_clock, simulator)
+    actuator_sim.SimulatorNode._publish(simulator, np.zeros(10))
+    record = Record(np.zeros(100), np.zeros(100), 1.0 / RATE, 1e5)
+    file = SimpleNamespace(_node=simulator, _out=Blocks(), _clock_changed=True)
+    file._start_clock = partial(lab_file.FileSource._start_clock, file)
+    lab_file.FileSource._publish(file, record, 40, 50, 0)
+    assert simulator.out.start == file._out.start == (10**12 - round(BLOCK * 1e9), 40)
+
+
 def test_what_comes_before_the_clock_is_recorded_at_its_first_time(start, probe, tmp_path):
     """Log times of 1970 would put hours between a set-up and its samples."""
     bag = tmp_path / 'bag'
@@ -89,7 +124,7 @@ def test_what_comes_before_the_clock_is_recorded_at_its_first_time(start, probe,
     keeper = Timekeeper(probe)
     probe.until(lambda: probe.number('recorder', 'messages written') > 20, 20, 'it goes on')
     probe.block(np.zeros(20), np.zeros(20))
-    probe.for_a_while(0.5)
+    probe.until_recorded(bag, 420)
     assert recorder.end() == 0, recorder.text
     keeper.end()
     assert np.array_equal(recorded(bag), np.arange(420))
@@ -149,3 +184,19 @@ def test_a_pacer_keeps_to_the_clock_it_is_given():
     at(50.25, 10)
     pacer.stop()
     assert jumps == [100.0, 50.0]
+
+
+def test_what_the_first_step_waits_for_is_no_lateness():
+    """A stream waits in its first step until its subscribers have the set-up."""
+    now, over = [0.0], threading.Event()
+
+    def steps():
+        now[0] += 100.0
+        for number in range(3):
+            yield Step(0.0, partial(now.__setitem__, 0, now[0] + 0.7 * (number == 1)))
+
+    pacer = Pacer(steps(), lambda: True, 1.0, lambda _: over.set(), lambda: now[0])
+    pacer.start()
+    assert over.wait(60.0)
+    # The second step takes 0.7 s, for which the third is late.
+    assert (pacer.late, pacer.latest) == (1, pytest.approx(0.7))
