@@ -89,8 +89,6 @@ def test_no_sample_is_sent_before_subscribers_have_the_set_up(node, start, probe
     assert recorder.end() == 0, recorder.text
     found = recorded(bag)
     assert len(found) >= samples and np.array_equal(found, np.arange(len(found)))
-    # To wait is not to be late.
-    assert probe.number(node, 'latest message (s)') < 0.5
 
 
 def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_path, monkeypatch):

@@ -67,10 +67,10 @@ def test_a_second_signal_ends_a_node_that_hangs():
         [sys.executable, '-c', HANGS, *times], stdout=subprocess.PIPE, text=True
     )
     assert process.stdout.readline() == 'ready\n'
-    for time in times:
+    for moment in times:
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        assert process.stdout.readline() == f'{time}\n'
+        assert process.stdout.readline() == f'{moment}\n'
     assert process.wait(60.0) == 130
 
 
