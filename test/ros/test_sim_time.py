@@ -191,7 +191,7 @@ def test_what_the_first_step_waits_for_is_no_lateness():
     now, over = [0.0], threading.Event()
 
     def steps():
-        now[0] += 100.0
+        now[0] += 0.9
         for number in range(3):
             yield Step(0.0, partial(now.__setitem__, 0, now[0] + 0.7 * (number == 1)))
 
