@@ -5,7 +5,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -109,6 +109,7 @@ class Probe(Node):
         super().__init__('probe')
         self.health = {}
         self.faults = defaultdict(str)
+        self.reports = Counter()
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
         self.index = 0
         self.callers = {}
@@ -117,6 +118,7 @@ class Probe(Node):
         for status in message.status:
             node = status.name.strip('/')
             self.health[node] = {v.key: v.value for v in status.values}
+            self.reports[node] += 1
             self.faults[node] += ''.join(
                 f'{v.key}: {v.value}\n' for v in status.values if v.key.endswith('(last)')
             )
@@ -133,6 +135,11 @@ class Probe(Node):
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             rclpy.spin_once(self, timeout_sec=0.02)
+
+    def for_reports(self, node, count):
+        """Spin until a node has reported so many times from now on."""
+        wanted = self.reports[node] + count
+        self.until(lambda: self.reports[node] >= wanted, 60, f'{count} reports of {node}')
 
     def until_recorded(self, bag, samples):
         """Spin until so many samples are in the file of a bag being written.
@@ -182,7 +189,10 @@ class Probe(Node):
         try:
             return self.call(ChangeState, f'{node}/change_state', request, attempts=1).success
         except AssertionError:
-            # The answer was lost: what it was shows in the state.
+            # The answer was lost: what it was shows in the state, the last one of a node that
+            # has gone in what it said last.
+            if self.value(node, 'state') == 'finalized':
+                return True
             return self.state(node) != before
 
     def parameters(self, node):

@@ -36,6 +36,22 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
     probe.create_subscription(StabilityMargin, 'stability_margin', found.append, 10)
     out = probe.create_publisher(PosteriorDraws, 'posterior_draws', topics.DRAWS.qos)
     probe.until(lambda: out.get_subscription_count() == 1 and node.alive, 60)
+    # That the probe knows of the node says nothing of the other way round, and what is published
+    # to who is not known yet is lost.
+    sent = 100
+
+    def met():
+        nonlocal sent
+        if not found:
+            sent += 1
+            out.publish(draws(sent))
+            probe.for_a_while(0.2)
+        return found and found[-1].window == sent
+
+    probe.until(met, 60, 'a margin')
+    probe.for_reports('margin', 2)
+    before = float(probe.value('margin', 'windows'))
+    found.clear()
     out.publish(draws(1))
     broken = draws(2)
     broken.values = broken.values[:-1]
@@ -56,7 +72,7 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
         assert (message.margin_upper < 0.0) == unstable
         assert message.delay_lower[1] < message.delay_median[1] < message.delay_upper[1]
         assert 0.01 < message.delay_median[1] < 0.05
-    probe.until(lambda: float(probe.value('margin', 'windows', 0)) == 2, 30)
+    probe.until(lambda: float(probe.value('margin', 'windows')) == before + 2, 60)
     for told in 'are no draws of 4 parameters', 'ess_min of 200 draws is NaN', 'NaN or infinite':
         assert told in node.text
     assert 'LinAlgError' not in node.text and 'internal error' not in node.text

@@ -81,7 +81,7 @@ def test_one_that_a_test_can_do_without_leaves_the_others(together, probe, tmp_p
     assert probe.transition('viewer', 'shutdown')
     before = probe.number('recorder', 'messages written')
     probe.until(lambda: probe.number('recorder', 'messages written') > before + 100, 20)
-    assert probe.value('viewer', 'state') == 'finalized'
+    probe.until(lambda: probe.value('viewer', 'state') == 'finalized')
     process.send_signal(signal.SIGINT)
     assert process.wait(20) == 0, (tmp_path / 'log').read_text()
     assert (bag / 'metadata.yaml').exists()

@@ -50,11 +50,12 @@ def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe)
     before = count()
     probe.until(lambda: count() >= before + 10, 30, 'complaint goes on')
 
+    taken = probe.number('estimator', 'samples')
     probe.setup(index=probe.index)
     probe.stream(motion(0.5))
-    probe.for_a_while(0.5)
+    probe.until(lambda: probe.number('estimator', 'samples') >= taken + 100, what='samples')
     before = count()
-    probe.for_a_while(1.0)
+    probe.for_reports('estimator', 5)
     assert count() == before
     assert estimator.alive
 
