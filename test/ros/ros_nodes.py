@@ -78,12 +78,31 @@ class Process:
     def text(self):
         return self.log.read_text(errors='replace')
 
+    def stop(self):
+        """Stop it; none of its threads runs when this returns."""
+        self.process.send_signal(signal.SIGSTOP)
+        end = time.monotonic() + 60.0
+        while not all('\tT (' in text for text in self._of_threads('status')):
+            assert time.monotonic() < end, f'{self.name} goes on'
+            time.sleep(1e-3)
+
     @contextmanager
     def held(self):
         """Stop it for a while, as a busy machine does; what is sent waits for it."""
-        self.process.send_signal(signal.SIGSTOP)
+        self.stop()
         yield
         self.process.send_signal(signal.SIGCONT)
+
+    def waited_for_a_core(self):
+        """Seconds for which its threads could have run and others did."""
+        return 1e-9 * sum(int(text.split()[1]) for text in self._of_threads('schedstat'))
+
+    def _of_threads(self, file):
+        found = []
+        for task in Path(f'/proc/{self.process.pid}/task').iterdir():
+            with suppress(OSError):  # it has ended
+                found.append((task / file).read_text())
+        return found
 
     def end(self, number=signal.SIGINT, timeout=20.0):
         """Send a signal; return the exit status."""
