@@ -104,7 +104,7 @@ class Process:
                 found.append((task / file).read_text())
         return found
 
-    def end(self, number=signal.SIGINT, timeout=20.0):
+    def end(self, number=signal.SIGINT, timeout=60.0):
         """Send a signal; return the exit status."""
         self.process.send_signal(number)
         return self.process.wait(timeout)
@@ -142,8 +142,8 @@ class Probe(Node):
                 f'{v.key}: {v.value}\n' for v in status.values if v.key.endswith('(last)')
             )
 
-    def until(self, condition, timeout=30.0, what=''):
-        """Spin until a condition holds."""
+    def until(self, condition, timeout=60.0, what=''):
+        """Spin until a condition holds; the limit is for what never comes, not for the slow."""
         end = time.monotonic() + timeout
         while not condition():
             assert time.monotonic() < end, f'timed out: {what or condition}; {self.health}'
@@ -158,7 +158,7 @@ class Probe(Node):
     def for_reports(self, node, count):
         """Spin until a node has reported so many times from now on."""
         wanted = self.reports[node] + count
-        self.until(lambda: self.reports[node] >= wanted, 60, f'{count} reports of {node}')
+        self.until(lambda: self.reports[node] >= wanted, what=f'{count} reports of {node}')
 
     def until_recorded(self, bag, samples):
         """Spin until so many samples are in the file of a bag being written.
@@ -171,7 +171,7 @@ class Probe(Node):
             self.for_a_while(0.1)
             return len(recorded(bag, lambda _: None)) >= samples
 
-        self.until(there, 60, f'{samples} samples in {bag}')
+        self.until(there, what=f'{samples} samples in {bag}')
 
     def value(self, node, key, default=None):
         """What a node last said under a key of /diagnostics."""

@@ -11,7 +11,7 @@ def test_a_cold_simulator_answers_and_ends(start, probe, tmp_path, monkeypatch):
     """No service answered for 167 s and Ctrl-C took 33 s, while a plant was compiled."""
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'nothing'))
     simulator = start('actuator_sim', installed=True, undeclared_effect='backlash:backlash=6e-5')
-    probe.until(lambda: 'compiling the plant' in simulator.text, 120, 'compiling')
+    probe.until(lambda: 'compiling the plant' in simulator.text, 250, 'compiling')
     for _ in range(3):
         began = time.monotonic()
         answer = probe.call(

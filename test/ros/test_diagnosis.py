@@ -28,8 +28,8 @@ def test_an_undeclared_effect_is_found_and_the_model_goes_on_with_it(start, prob
     recorder = start('recorder', bag=str(bag))
     estimator = start('estimator', prior='sequential', calibration=str(path))
     diagnoser = start('diagnoser', apply=True, minimum=25.0)
-    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
-    probe.until(lambda: probe.value('diagnoser', 'state') == 'active', 30)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')
+    probe.until(lambda: probe.value('diagnoser', 'state') == 'active')
     simulator = start(
         'actuator_sim',
         rate=250.0,
@@ -86,7 +86,7 @@ def test_an_undeclared_effect_is_found_and_the_model_goes_on_with_it(start, prob
 def test_a_diagnosis_on_request_reports_its_progress_and_can_be_cancelled(start, probe):
     diagnoser = start('diagnoser')
     client = ActionClient(probe, Diagnose, 'diagnoser/diagnose')
-    probe.until(client.server_is_ready, 30)
+    probe.until(client.server_is_ready)
     told, diagnoses = [], []
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     probe.create_subscription(Diagnosis, 'diagnosis', diagnoses.append, latched)
@@ -95,12 +95,12 @@ def test_a_diagnosis_on_request_reports_its_progress_and_can_be_cancelled(start,
         sent = client.send_goal_async(
             Diagnose.Goal(**goal), feedback_callback=lambda m: told.append(m.feedback)
         )
-        probe.until(sent.done, 20)
+        probe.until(sent.done)
         return sent.result()
 
     def result(handle):
         future = handle.get_result_async()
-        probe.until(future.done, 200, 'result')
+        probe.until(future.done, 250, 'result')
         return future.result().result
 
     unusable = result(ask(records=['no-such-bag']))
@@ -111,9 +111,9 @@ def test_a_diagnosis_on_request_reports_its_progress_and_can_be_cancelled(start,
     goal = {'records': [str(BAGS / 'undeclared_clamped')], 'seed': 3}
     handle = ask(**goal)
     assert handle.accepted and not ask(**goal).accepted  # one at a time
-    probe.until(lambda: told, 120, 'feedback')
+    probe.until(lambda: told, 250, 'feedback')
     cancelled = handle.cancel_goal_async()
-    probe.until(cancelled.done, 20)
+    probe.until(cancelled.done)
     assert not result(handle).success
 
     told.clear()
@@ -122,7 +122,7 @@ def test_a_diagnosis_on_request_reports_its_progress_and_can_be_cancelled(start,
     assert told and all(0.0 <= f.fraction <= 1.0 and f.stage for f in told)
     fractions = [f.fraction for f in told]
     assert fractions == sorted(fractions) and fractions[-1] == 1.0
-    probe.until(lambda: diagnoses, 10)
+    probe.until(lambda: diagnoses)
     assert diagnoses[0].verdict == answer.diagnosis.verdict
     assert diagnoser.end() == 0
 
@@ -131,9 +131,9 @@ def test_a_diagnosis_that_is_given_up_is_told(start, probe):
     """As when a launch ends while it runs: the log says so, and what to do."""
     diagnoser = start('diagnoser')
     client = ActionClient(probe, Diagnose, 'diagnoser/diagnose')
-    probe.until(client.server_is_ready, 60)
+    probe.until(client.server_is_ready)
     sent = client.send_goal_async(Diagnose.Goal(records=[str(BAGS / 'undeclared_clamped')]))
-    probe.until(sent.done, 20)
-    probe.until(lambda: probe.value('diagnoser', 'diagnosing') == 'True', 20)
+    probe.until(sent.done)
+    probe.until(lambda: probe.value('diagnoser', 'diagnosing') == 'True')
     assert diagnoser.end() == 0
     assert 'given up after' in diagnoser.text and 'linger' in diagnoser.text

@@ -80,7 +80,7 @@ def carried(start, probe, tmp_path, scheme, rate, seconds, layout=None):
         wait_for=1,
         block=round(rate / 100),
     )
-    probe.until(lambda: 'the stream begins' in bridge.text, 60, 'bridge')
+    probe.until(lambda: 'the stream begins' in bridge.text, what='bridge')
     sender = send(given, at, *(['--layout', layout] if layout else []))
     probe.until(
         lambda: probe.number('lab_bridge', 'samples') == samples, seconds + 60, 'all samples'
@@ -194,8 +194,8 @@ def test_every_fault_of_a_wire_is_told_and_no_sample_is_made_up(start, probe, tm
     port, bag = free_port(), tmp_path / 'bag'
     recorder = start('recorder', bag=str(bag))
     bridge = start('lab_bridge', source=f'udp://127.0.0.1:{port}', rate=1000.0, wait_for=1)
-    probe.until(lambda: 'the stream begins' in bridge.text, 60)
-    probe.until(lambda: 'nothing arrives' in probe.faults['lab_bridge'], 15)
+    probe.until(lambda: 'the stream begins' in bridge.text)
+    probe.until(lambda: 'nothing arrives' in probe.faults['lab_bridge'])
     out = socket.socket(type=socket.SOCK_DGRAM)
 
     def put(*numbers, value=None):
@@ -278,9 +278,9 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
     controller = socket.socket(type=socket.SOCK_DGRAM)
     with closing(controller):
         controller.bind(('127.0.0.1', port))
-        probe.until(lambda: 'the stream begins' in bridge.text, 200, 'estimator compiled')
+        probe.until(lambda: 'the stream begins' in bridge.text, 250, 'estimator compiled')
         sender = send(given, at)
-        probe.until(lambda: probe.number('lab_bridge', 'results sent') >= 4, 60, 'results')
+        probe.until(lambda: probe.number('lab_bridge', 'results sent') >= 4, what='results')
         controller.settimeout(20.0)
         values = unpacked(controller.recv(1000))
         # The same window once more, as soon as P(unstable) is known.
@@ -289,8 +289,8 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
             before, risk = risk, unpacked(controller.recv(1000))
     assert all(before[name] == risk[name] for name in ('window', 'time', 'delay', 'beta_1_mean'))
     assert 0.0 <= risk['p_unstable'] <= risk['p_unstable_upper'] <= 1.0
-    probe.until(lambda: probe.number('lab_bridge', 'samples') == len(record), 30, 'all samples')
-    assert sender.wait(30) in (0, 1)
+    probe.until(lambda: probe.number('lab_bridge', 'samples') == len(record), what='all samples')
+    assert sender.wait(60) in (0, 1)
     # At 5 Hz this actuator goes 0.5002 of the way.
     assert 0.0 < values['delay'] < 0.1 and 0.4 < values['amplitude'] < 0.6
     assert abs(values['time'] - time.time()) < 60
@@ -316,5 +316,5 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
 )
 def test_what_cannot_be_listened_to_is_said(parameters, told, start):
     bridge = start('lab_bridge', **parameters)
-    assert bridge.wait(30) == 2
+    assert bridge.wait(60) == 2
     assert told in bridge.text and 'Traceback' not in bridge.text

@@ -35,7 +35,7 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
     found = []
     probe.create_subscription(StabilityMargin, 'stability_margin', found.append, 10)
     out = probe.create_publisher(PosteriorDraws, 'posterior_draws', topics.DRAWS.qos)
-    probe.until(lambda: out.get_subscription_count() == 1 and node.alive, 60)
+    probe.until(lambda: out.get_subscription_count() == 1 and node.alive)
     # That the probe knows of the node says nothing of the other way round, and what is published
     # to who is not known yet is lost.
     sent = 100
@@ -48,7 +48,7 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
             probe.for_a_while(0.2)
         return found and found[-1].window == sent
 
-    probe.until(met, 60, 'a margin')
+    probe.until(met, what='a margin')
     probe.for_reports('margin', 2)
     before = float(probe.value('margin', 'windows'))
     found.clear()
@@ -63,7 +63,7 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
     empty.values[5] = float('nan')
     out.publish(empty)
     out.publish(draws(3))
-    probe.until(lambda: len(found) == 2, 60)
+    probe.until(lambda: len(found) == 2)
     assert [m.window for m in found] == [1, 3]
     for message in found:
         assert message.partition == 'hybrid'
@@ -72,7 +72,7 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
         assert (message.margin_upper < 0.0) == unstable
         assert message.delay_lower[1] < message.delay_median[1] < message.delay_upper[1]
         assert 0.01 < message.delay_median[1] < 0.05
-    probe.until(lambda: float(probe.value('margin', 'windows')) == before + 2, 60)
+    probe.until(lambda: float(probe.value('margin', 'windows')) == before + 2)
     for told in 'are no draws of 4 parameters', 'ess_min of 200 draws is NaN', 'NaN or infinite':
         assert told in node.text
     assert 'LinAlgError' not in node.text and 'internal error' not in node.text

@@ -49,7 +49,7 @@ def killed_at_random(start, probe, tmp_path, times, seed):
 
     probe.create_subscription(SampleBlock, 'samples', hear, QoSProfile(depth=2000))
     simulator = start('actuator_sim', rate=1000.0, repeat=True, rest=0.0, block=10)
-    probe.until(lambda: heard, 60, 'samples')
+    probe.until(lambda: heard, what='samples')
     worst, starts = 0.0, []
     for number in range(times):
         bag = tmp_path / f'bag_{number}'
@@ -76,15 +76,15 @@ def killed_at_random(start, probe, tmp_path, times, seed):
         sizes = [len(m.command) for m in blocks]
         assert np.array_equal(np.diff(index), sizes[:-1])
         # What the test itself has yet to take from DDS.
-        probe.until(lambda killed=killed: newest[0] > killed, 60, 'what was sent until the kill')
+        probe.until(lambda killed=killed: newest[0] > killed, what='what was sent until the kill')
         assert all(bytes(m.measured) == heard[m.index][1] for m in blocks)
         late = max(i for i, (sent, _) in heard.items() if sent <= killed)
         missing = (late - index[-1]) / 1000.0
         worst = max(worst, missing)
         made, took = starts[-1]
         print(
-            f'kill {number + 1}: {missing:.3f} s missing, {starved:.3f} s without a core; bag made after {made:.1f} s, three '
-            f'seconds recorded after {took:.1f} s',
+            f'kill {number + 1}: {missing:.3f} s missing, {starved:.3f} s without a core; '
+            f'bag made after {made:.1f} s, three seconds recorded after {took:.1f} s',
             flush=True,
         )
         assert missing <= LOST + starved
@@ -127,19 +127,19 @@ def test_what_comes_while_a_disk_is_full_is_recorded_when_it_is_not(start, probe
     def number(key):
         return probe.number('recorder', key)
 
-    probe.until(sending(probe, lambda: number('messages written') > 50), 60, 'recording')
+    probe.until(sending(probe, lambda: number('messages written') > 50), what='recording')
     _, most = resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (20_000, -1))
     full = sending(probe, lambda: 'quota is full' in probe.faults['recorder'])
-    probe.until(full, 30, 'a full disk')
+    probe.until(full, what='a full disk')
     written = number('messages written')
-    probe.until(sending(probe, lambda: number('messages waiting (B)') > 50_000), 30, 'it waits')
+    probe.until(sending(probe, lambda: number('messages waiting (B)') > 50_000), what='it waits')
     assert number('messages written') <= written
     resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (most, most))
     again = sending(probe, lambda: 'takes messages again' in recorder.text)
-    probe.until(again, 20, 'it goes on')
-    probe.until(sending(probe, lambda: number('messages written') > probe.index / 100 - 50), 20)
+    probe.until(again, what='it goes on')
+    probe.until(sending(probe, lambda: number('messages written') > probe.index / 100 - 50))
     assert probe.value('recorder', 'messages lost') == '0'
-    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20.0))
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=60.0))
     assert recorder.end() == 0 and 'Traceback' not in recorder.text
     assert (bag / 'metadata.yaml').exists() and summarise(bag).finished
     assert np.array_equal(recorded(bag), np.arange(probe.index))
@@ -169,17 +169,17 @@ def test_a_disk_that_stays_full_leaves_a_finished_bag_and_the_loss_is_told(
     def number(key):
         return probe.number('recorder', key)
 
-    probe.until(sending(probe, lambda: number('messages written') > 50), 60, 'recording')
+    probe.until(sending(probe, lambda: number('messages written') > 50), what='recording')
     with (small_disk / 'other').open('wb', buffering=0) as file, suppress(OSError):
         while file.write(bytes(4096)):
             pass
     full = sending(probe, lambda: 'quota is full' in probe.faults['recorder'])
-    probe.until(full, 60, 'a full disk')
-    probe.until(sending(probe, lambda: number('messages waiting (B)') > 50_000), 30, 'it waits')
-    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20.0))
+    probe.until(full, what='a full disk')
+    probe.until(sending(probe, lambda: number('messages waiting (B)') > 50_000), what='it waits')
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=60.0))
     # What could not be written is lost with the process: it says how much, and fails.
     assert recorder.end() == 1, recorder.text
-    probe.until(lambda: 'more are lost' in probe.faults['recorder'], 10, 'the loss')
+    probe.until(lambda: 'more are lost' in probe.faults['recorder'], what='the loss')
     lost = number('messages lost')
     assert lost > 20 and f'{lost:g} more are lost' in recorder.text
     assert 'Traceback' not in recorder.text
@@ -234,10 +234,10 @@ def test_a_disk_that_goes_read_only_keeps_all_but_the_last_seconds(breakable, st
     probe.create_subscription(SampleBlock, 'samples', lambda m: newest.append(m.index), 100)
     recorder = start('recorder', bag=str(bag))
     simulator = start('actuator_sim', rate=1000.0, repeat=True, wait_for=1)
-    probe.until(lambda: probe.number('recorder', 'messages written') > 500, 60, 'recording')
+    probe.until(lambda: probe.number('recorder', 'messages written') > 500, what='recording')
     before = newest[-1]
     break_it()
-    probe.until(lambda: 'read-only' in probe.faults['recorder'], 30, 'a read-only disk')
+    probe.until(lambda: 'read-only' in probe.faults['recorder'], what='a read-only disk')
     probe.for_a_while(2.0)
     assert recorder.alive
     # What came since is lost with the process: it says so, and fails.
@@ -255,7 +255,7 @@ def test_a_disk_that_goes_read_only_keeps_all_but_the_last_seconds(breakable, st
 
 def test_a_folder_that_cannot_be_written_is_said(start):
     recorder = start('recorder', bag='/proc/none/bag')
-    assert recorder.wait(30) == 2 and 'cannot' in recorder.text
+    assert recorder.wait(60) == 2 and 'cannot' in recorder.text
 
 
 @pytest.mark.slow
@@ -268,5 +268,5 @@ def test_an_estimator_that_is_killed_begins_anew_and_says_so(start, probe):
     probe.health.clear()
     second = start('estimator', **QUICK)
     probe.until(lambda: 'begins anew at sample' in probe.faults['estimator'], 250, 'begins anew')
-    probe.until(lambda: probe.number('estimator', 'windows') >= 1, 60, 'windows')
+    probe.until(lambda: probe.number('estimator', 'windows') >= 1, what='windows')
     assert second.end() == 0 and simulator.end() == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from actuator_glue_msgs.msg import SampleBlock
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from ros_nodes import QUICK, RATE, recorded
+from ros_nodes import QUICK, RATE
 from std_msgs.msg import String
 
 from actuator_glue.io.bag_reader import decoded
@@ -21,7 +21,7 @@ def test_durability_is_overridden_by_a_parameter(start, probe):
     name = 'qos_overrides./samples.publisher.durability'
     simulator = start('actuator_sim', wait_for=99, **{name: 'transient_local'})
     probe.until(lambda: probe.value('actuator_sim', 'state') == 'active')
-    probe.until(lambda: probe.get_publishers_info_by_topic('/samples'), 10)
+    probe.until(lambda: probe.get_publishers_info_by_topic('/samples'))
     (found,) = probe.get_publishers_info_by_topic('/samples')
     assert found.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     assert simulator.end() == 0
@@ -34,7 +34,7 @@ def test_the_recorder_adapts_to_what_is_offered(start, probe, tmp_path):
     note.publish(String(data='written before'))
     recorder = start('recorder', bag=str(bag), topics=['note'])
     samples = probe.create_publisher(SampleBlock, 'samples', BEST_EFFORT)
-    probe.until(lambda: samples.get_subscription_count(), 40, 'adapted')
+    probe.until(lambda: samples.get_subscription_count(), what='adapted')
     for index in range(0, 100, 10):
         samples.publish(SampleBlock(index=index, command=np.zeros(10), measured=np.zeros(10)))
         probe.for_a_while(0.02)
@@ -44,7 +44,7 @@ def test_the_recorder_adapts_to_what_is_offered(start, probe, tmp_path):
         found = decoded(bag, ('std_msgs/msg/String',), note=lambda _: None)
         return [m.data for _, m in found]
 
-    probe.until(lambda: probe.for_a_while(0.1) or noted(), 60, 'what was written before')
+    probe.until(lambda: probe.for_a_while(0.1) or noted(), what='what was written before')
     assert recorder.end() == 0, recorder.text
     assert noted() == ['written before']
 
@@ -52,10 +52,10 @@ def test_the_recorder_adapts_to_what_is_offered(start, probe, tmp_path):
 @pytest.mark.slow
 def test_a_partner_that_will_never_be_heard_is_a_warning(start, probe):
     estimator = start('estimator', **QUICK)
-    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 200, 'estimator compiled')
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')
     probe.create_publisher(SampleBlock, 'samples', BEST_EFFORT)
     told = 'nothing is heard of /probe on /samples: reliable is asked for, best effort offered'
-    probe.until(lambda: told in probe.faults['estimator'], 15, 'warning')
+    probe.until(lambda: told in probe.faults['estimator'], what='warning')
     probe.for_a_while(2.5)
     # It stays, and is logged once.
     assert int(probe.value('estimator', 'incompatible QoS (count)')) >= 3
@@ -71,9 +71,9 @@ def test_a_node_in_place_of_a_killed_one_hears_at_once(start, probe, tmp_path):
     for attempt in range(10):
         name = f'recorder_{attempt}'
         recorder = start('recorder', name=name, bag=str(tmp_path / name), diagnostics_period=0.1)
-        probe.until(lambda p=recorder: 'recording to' in p.text, 40, 'recorder')
+        probe.until(lambda p=recorder: 'recording to' in p.text, what='recorder')
         begun = time.monotonic()
-        probe.until(lambda p=recorder: count(tmp_path / p.name), 40, 'samples')
+        probe.until(lambda p=recorder: count(tmp_path / p.name), what='samples')
         waits.append(time.monotonic() - begun)
         recorder.process.send_signal(signal.SIGKILL)
         recorder.process.wait()

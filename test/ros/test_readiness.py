@@ -22,7 +22,7 @@ def test_samples_are_listened_to_once_the_worker_is_ready(make, probe):
         executor.spin_once(0.02)
     assert node.count_subscribers(topic) == 0 and node.compiling
     node.worker.ready.set()
-    probe.until(lambda: executor.spin_once(0.02) or node.count_subscribers(topic), 5)
+    probe.until(lambda: executor.spin_once(0.02) or node.count_subscribers(topic))
     if make is estimator.EstimatorNode:
         for ready, why in ((False, 'the worker is still compiling'), (True, 'took longer')):
             node.worker.ready = type(begun)()
@@ -40,8 +40,8 @@ def test_samples_are_listened_to_once_the_worker_is_ready(make, probe):
 def test_a_stream_says_for_whom_it_waits(start, probe):
     simulator = start('actuator_sim', wait_for=2)
     waits = 'waiting for 2 subscribers of samples, 0 are there'
-    probe.until(lambda: simulator.text.count(waits) >= 2, 20, 'said, and said again')
+    probe.until(lambda: simulator.text.count(waits) >= 2, what='said, and said again')
     start('estimator', **QUICK)
-    probe.until(lambda: '2 subscribers of samples, 1 is there' in simulator.text, 120)
+    probe.until(lambda: '2 subscribers of samples, 1 is there' in simulator.text, 250)
     assert 'the stream begins' not in simulator.text
     assert simulator.end() == 0

@@ -61,18 +61,18 @@ def heard(probe, *wanted):
 def test_one_actuator_of_two_is_chosen(play, probe):
     got = heard(probe, topics.SAMPLES, topics.TEST_SETUP)
     player = play('/x2', speed=20.0, wait_for=1)
-    probe.until(lambda: sum(len(m.command) for m in got['samples']) >= 400, 40, 'samples')
-    assert player.wait(20) == 0, player.text
+    probe.until(lambda: sum(len(m.command) for m in got['samples']) >= 400, what='samples')
+    assert player.wait(60) == 0, player.text
     command = np.concatenate([m.command for m in got['samples']])
     assert command == pytest.approx(motion(2e-3).command) and len(got['test_setup']) == 1
 
 
 def test_two_actuators_without_a_choice_are_refused(play, probe):
     player = play('')
-    probe.until(lambda: 'choose one with the parameter namespace' in player.text, 30)
+    probe.until(lambda: 'choose one with the parameter namespace' in player.text)
     assert 'samples of 2 actuators (/x1/samples, /x2/samples)' in player.text
     other = play('x3')
-    probe.until(lambda: "no samples under 'x3'" in other.text, 30)
+    probe.until(lambda: "no samples under 'x3'" in other.text)
 
 
 def test_all_results_are_published_again(start, probe, tmp_path):
@@ -98,6 +98,6 @@ def test_all_results_are_published_again(start, probe, tmp_path):
     player = start('replay', bag=str(bag), results=True, speed=20.0, wait_for=1)
     names = [topic.name for topic in (*RESULTS, topics.SAMPLES, topics.TEST_SETUP)]
     assert {'posterior_draws', 'estimator_setup', 'stability_margin'} < set(names)
-    probe.until(lambda: all(got[name] for name in names), 40, 'one of each')
-    assert player.wait(20) == 0, player.text
+    probe.until(lambda: all(got[name] for name in names), what='one of each')
+    assert player.wait(60) == 0, player.text
     assert got['estimator_setup'][0].seed == EstimatorSettings().seed

@@ -40,13 +40,13 @@ def test_the_policy_is_what_a_node_does(node, start, probe, tmp_path):
         'lab_bridge': {'file': str(bag), 'wait_for': 99, 'results': 'udp://127.0.0.1:9'},
     }
     process = start(node, **given.get(node, {}))
-    probe.until(lambda: probe.value(node, 'state') == 'active', 60)
+    probe.until(lambda: probe.value(node, 'state') == 'active')
     if node in ('estimator', 'diagnoser'):
         probe.until(lambda: probe.value(node, 'worker') == 'ready', 250, 'compiled')
         probe.for_a_while(1.0)
 
     # Discovery goes on after a node has been heard: its name comes with a message of its own.
-    probe.until(lambda: (node, '/') in probe.get_node_names_and_namespaces(), 30, 'discovered')
+    probe.until(lambda: (node, '/') in probe.get_node_names_and_namespaces(), what='discovered')
 
     def names(ask):
         return {name for name, _ in ask(node, '/') if ACTION not in name}
@@ -65,7 +65,7 @@ def test_the_policy_is_what_a_node_does(node, start, probe, tmp_path):
         return complete and listed - names(heard) <= OPTIONAL
 
     with suppress(AssertionError):
-        probe.until(known, 30)
+        probe.until(known)
     for what, ask in exact.items():
         assert names(ask) == allowed(node, *what)
     assert names(heard) <= listed and listed - names(heard) <= OPTIONAL

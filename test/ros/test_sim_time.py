@@ -46,7 +46,7 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
         np.savetxt(file, table, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
         given = {'file': str(file), 'specimen_stiffness': 1e5}
     process = start(node, use_sim_time=True, wait_for=1, **given)
-    probe.until(lambda: len(blocks) > 40, 60, 'samples')
+    probe.until(lambda: len(blocks) > 40, what='samples')
 
     def stands():
         """The clock stands still: what was due leaves, however long that takes, and no more."""
@@ -55,7 +55,7 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
         def late():
             return abs(stamps(blocks[-1:])[0] - now)
 
-        probe.until(lambda: late() < 2.5 * BLOCK, 60, 'what was due')
+        probe.until(lambda: late() < 2.5 * BLOCK, what='what was due')
         found = len(blocks)
         probe.for_a_while(0.5)
         assert len(blocks) <= found + 1 and late() < 2.5 * BLOCK
@@ -66,7 +66,7 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
         before, then = stands()
         clock.jump(jump)
         clock.speed = speed
-        probe.until(lambda: clock.now > then + jump + 1.0, 60, 'the clock')
+        probe.until(lambda: clock.now > then + jump + 1.0, what='the clock')
         after, now = stands()
         assert abs((after - before) * BLOCK - (now - then - jump)) < 3 * BLOCK
 
@@ -115,14 +115,14 @@ def test_what_comes_before_the_clock_is_recorded_at_its_first_time(start, probe,
     """Log times of 1970 would put hours between a set-up and its samples."""
     bag = tmp_path / 'bag'
     recorder = start('recorder', use_sim_time=True, bag=str(bag))
-    probe.until(lambda: probe.value('recorder', 'state') == 'active', 60)
+    probe.until(lambda: probe.value('recorder', 'state') == 'active')
     probe.open_stream()
     probe.setup()
     for _ in range(20):
         probe.block(np.zeros(20), np.zeros(20))
-    probe.until(lambda: 'wait in memory for the first /clock' in probe.faults['recorder'], 20)
+    probe.until(lambda: 'wait in memory for the first /clock' in probe.faults['recorder'])
     keeper = Timekeeper(probe)
-    probe.until(lambda: probe.number('recorder', 'messages written') > 20, 20, 'it goes on')
+    probe.until(lambda: probe.number('recorder', 'messages written') > 20, what='it goes on')
     probe.block(np.zeros(20), np.zeros(20))
     probe.until_recorded(bag, 420)
     assert recorder.end() == 0, recorder.text
@@ -141,14 +141,14 @@ def test_what_comes_before_the_clock_is_recorded_at_its_first_time(start, probe,
 def test_where_the_clock_never_comes_the_computers_time_is_taken_and_told(start, probe, tmp_path):
     bag = tmp_path / 'bag'
     recorder = start('recorder', use_sim_time=True, bag=str(bag))
-    probe.until(lambda: probe.value('recorder', 'state') == 'active', 60)
+    probe.until(lambda: probe.value('recorder', 'state') == 'active')
     probe.open_stream()
     probe.setup()
     probe.block(np.zeros(20), np.zeros(20))
     # A busy recorder may tell of the set-up before it has the block.
-    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20))
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=60.0))
     probe.faults.clear()
-    probe.until(lambda: 'wait in memory for the first /clock' in probe.faults['recorder'], 20)
+    probe.until(lambda: 'wait in memory for the first /clock' in probe.faults['recorder'])
     assert recorder.end() == 0, recorder.text
     assert np.array_equal(recorded(bag), np.arange(20))
     logged = np.array([m.log_time for m in messages(bag)]) * 1e-9

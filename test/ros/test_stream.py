@@ -29,14 +29,14 @@ def begin(start, probe, bag, **settings):
     """Start recorder and estimator and wait until the estimator has compiled."""
     recorder = start('recorder', bag=str(bag))
     estimator = start('estimator', **settings)
-    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
-    probe.until(lambda: probe.value('recorder', 'state') == 'active', 20)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')
+    probe.until(lambda: probe.value('recorder', 'state') == 'active')
     return recorder, estimator
 
 
 def finish(probe, recorder, estimator, samples):
     """Wait until everything sent has been estimated; end both; nothing died."""
-    probe.until(lambda: probe.number('estimator', 'samples') >= samples, 30, 'samples')
+    probe.until(lambda: probe.number('estimator', 'samples') >= samples, what='samples')
     probe.for_a_while(2.5)
     assert estimator.end() == 0, estimator.text
     assert recorder.end(signal.SIGTERM) == 0, recorder.text
@@ -101,7 +101,7 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
         undeclared_effect='delay:delay=0.004',
         sealed_file=str(tmp_path / 'truth.json'),
     )
-    probe.until(lambda: probe.number('estimator', 'windows') >= 3, 60, 'windows')
+    probe.until(lambda: probe.number('estimator', 'windows') >= 3, what='windows')
     refused = probe.call(SetModel, 'estimator/set_model', SetModel.Request(effects=['nothing']))
     assert not refused.success and 'not in the catalogue' in refused.message
     refused = probe.call(
@@ -120,7 +120,7 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
         ),
     )
     assert taken.success, taken.message
-    probe.until(lambda: probe.value('estimator', 'model') == 'delay', 10)
+    probe.until(lambda: probe.value('estimator', 'model') == 'delay')
     # Beside it another, which a process of its own samples whenever it can.
     names = ('delay',), ('bias',)
     two = Proposal(
@@ -159,11 +159,11 @@ def test_a_file_is_streamed_and_replayed_faster_than_real_time(start, probe, tmp
     bridge = start(
         'lab_bridge', file=str(file), specimen_stiffness=0.0, speed=5.0, wait_for=1, preview=1.0
     )
-    assert bridge.wait(40) == 0, bridge.text
+    assert bridge.wait(60) == 0, bridge.text
     assert recorder.end() == 0
     second = start('recorder', name='recorder_2', bag=str(bags[1]))
     player = start('replay', bag=str(bags[0]), speed=5.0, wait_for=1)
-    assert player.wait(40) == 0, player.text
+    assert player.wait(60) == 0, player.text
     assert second.end() == 0
     for bag in bags:
         assert np.array_equal(recorded(bag), np.arange(1200))
@@ -208,7 +208,7 @@ def test_an_undeclared_effect_is_told_to_nobody_but_the_sealed_file(start, probe
         undeclared_effect='backlash:backlash=6.25e-5',
         sealed_file=str(sealed),
     )
-    probe.until(lambda: probe.number('actuator_sim', 'samples') > 100, 30)
+    probe.until(lambda: probe.number('actuator_sim', 'samples') > 100)
     (hidden,) = probe.get('actuator_sim', ['undeclared_effect'])
     assert 'backlash' not in hidden.string_value
     truth = json.loads(sealed.read_text())
@@ -221,7 +221,7 @@ def test_an_undeclared_effect_is_told_to_nobody_but_the_sealed_file(start, probe
     assert taken.successful
     (hidden,) = probe.get('actuator_sim', ['undeclared_effect'])
     assert 'gap' not in hidden.string_value
-    probe.until(lambda: 'specimen-gap' in sealed.read_text(), 10)
+    probe.until(lambda: 'specimen-gap' in sealed.read_text())
     probe.for_a_while(1.0)
     assert simulator.end() == 0 and recorder.end() == 0
     content = b''.join(p.read_bytes() for p in bag.iterdir())

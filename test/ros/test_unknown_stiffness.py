@@ -22,7 +22,7 @@ def motion(seconds):
 
 def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe):
     estimator = start('estimator', diagnostics_period=0.2, **QUICK)
-    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')
     probe.open_stream()
     # What a late joiner gets: both have passed, the second one governs. And one for later. They
     # lie there together with the first samples when the node next looks.
@@ -36,7 +36,7 @@ def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe)
         probe.stream(record.slice(0, 100))
         probe.for_a_while(0.5)
     probe.stream(record.slice(100, len(record)))
-    probe.until(lambda: probe.number('estimator', 'windows') >= 1, 30, 'a window')
+    probe.until(lambda: probe.number('estimator', 'windows') >= 1, what='a window')
     assert TOLD not in probe.faults['estimator']
 
     probe.setup(stiffness=-1.0, index=probe.index)
@@ -45,10 +45,10 @@ def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe)
     def count():
         return int(probe.value('estimator', 'test set-up (count)', 0))
 
-    probe.until(lambda: TOLD in probe.faults['estimator'], 15, 'complaint')
+    probe.until(lambda: TOLD in probe.faults['estimator'], what='complaint')
     # Nothing comes any more, and nothing has changed.
     before = count()
-    probe.until(lambda: count() >= before + 10, 30, 'complaint goes on')
+    probe.until(lambda: count() >= before + 10, what='complaint goes on')
 
     taken = probe.number('estimator', 'samples')
     probe.setup(index=probe.index)
@@ -62,26 +62,26 @@ def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe)
 
 def test_a_goal_is_told_why_there_is_nothing_to_diagnose(start, probe):
     diagnoser = start('diagnoser', diagnostics_period=0.2)
-    probe.until(lambda: probe.value('diagnoser', 'worker') == 'ready', 240, 'compiled')
+    probe.until(lambda: probe.value('diagnoser', 'worker') == 'ready', 250, 'compiled')
     probe.open_stream()
     client = ActionClient(probe, Diagnose, 'diagnoser/diagnose')
-    probe.until(client.server_is_ready, 20, 'action')
+    probe.until(client.server_is_ready, what='action')
 
     def answer():
         asked = client.send_goal_async(Diagnose.Goal())
-        probe.until(asked.done, 20, 'goal')
+        probe.until(asked.done, what='goal')
         result = asked.result().get_result_async()
-        probe.until(result.done, 20, 'result')
+        probe.until(result.done, what='result')
         assert not result.result().result.success
         return result.result().result.message
 
     assert 'no stretch of 5 s' in answer()
     probe.stream(motion(1.0))
-    probe.until(lambda: 'nothing on test_setup' in probe.faults['diagnoser'], 15, 'no set-up')
+    probe.until(lambda: 'nothing on test_setup' in probe.faults['diagnoser'], what='no set-up')
     assert 'nothing on test_setup yet' in answer()
     probe.setup(stiffness=-1.0, index=probe.index)
     probe.stream(motion(6.0))
-    probe.until(lambda: TOLD in probe.faults['diagnoser'], 15, 'unknown')
+    probe.until(lambda: TOLD in probe.faults['diagnoser'], what='unknown')
     assert TOLD in answer()
     assert diagnoser.alive
     client.destroy()

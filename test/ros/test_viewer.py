@@ -11,7 +11,7 @@ from actuator_glue.cli.main import main
 
 def test_the_page_shows_what_is_published(start, probe):
     viewer = start('viewer', port=0)
-    probe.until(lambda: str(probe.value('viewer', 'page', '')).startswith('http'), 60)
+    probe.until(lambda: str(probe.value('viewer', 'page', '')).startswith('http'))
     url = probe.value('viewer', 'page').rstrip('/')
     probe.open_stream()
     probe.setup(stiffness=250e3)
@@ -19,7 +19,7 @@ def test_the_page_shows_what_is_published(start, probe):
     for _ in range(20):
         probe.block(*rng.standard_normal((2, 100)) * 1e-3)
         probe.for_a_while(0.02)
-    probe.until(lambda: float(probe.value('viewer', 'messages', 0)) >= 21, 30)
+    probe.until(lambda: float(probe.value('viewer', 'messages', 0)) >= 21)
 
     async def look():
         async with (
