@@ -113,7 +113,7 @@ def test_a_killed_worker_and_a_killed_client_cost_no_row(
             first.send_signal(signal.SIGKILL)
 
     found = ag.campaign(records, out, scheduler=scheduler, analysis=ANALYSIS, progress=kill)
-    first.wait(timeout=10.0)
+    first.wait(timeout=60.0)
     rows = dict(made.all())
     assert len(rows) == 12 and len(found.table) == 12
     assert sorted(found.table['group']) == sorted(

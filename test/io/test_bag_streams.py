@@ -195,12 +195,13 @@ RECORDER = textwrap.dedent(
     zeros = np.zeros(10)
     index, start = 0, time.monotonic()
     while True:
+        now = time.time_ns()
         block = messages.message(
-            'SampleBlock', header=messages.header(time.time_ns(), 'a'), period=1e-3,
+            'SampleBlock', header=messages.header(now, 'a'), period=1e-3,
             index=index, command=zeros, measured=zeros, force=zeros[:0],
         )
-        writer.write('/samples', block, time.time_ns())
-        print(time.time_ns(), flush=True)
+        writer.write('/samples', block, now)
+        print(now, flush=True)
         index += 10
         time.sleep(max(0.0, start + index * 1e-3 - time.monotonic()))
     """

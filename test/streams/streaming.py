@@ -47,7 +47,7 @@ def connect(address, its=None):
     return connector(where, its or terms())
 
 
-def received(listener, count, reception=None, timeout=10.0):
+def received(listener, count, reception=None, timeout=60.0):
     """Samples that a listener and a reception make of what comes, up to a count."""
     reception = reception or Reception(PLAIN, 1000.0)
     found, end = [], time.monotonic() + timeout
@@ -55,6 +55,15 @@ def received(listener, count, reception=None, timeout=10.0):
         for rows in listener.receive(0.05):
             found += reception.push(rows, time.monotonic())
         found += reception.waited(time.monotonic(), time.time_ns())
+    return found
+
+
+def counted(listener, name):
+    """Take what comes until a listener has counted it; return the messages that it let through."""
+    found, end = [], time.monotonic() + 60.0
+    while not listener.counts[name]:
+        assert time.monotonic() < end, f'nothing is {name}'
+        found += listener.receive(0.05)
     return found
 
 

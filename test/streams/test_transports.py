@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from streaming import connect, free_port, joined, layout, listen, received, record, terms
+from streaming import connect, counted, free_port, joined, layout, listen, received, record, terms
 
 from actuator_glue.errors import InputError
 from actuator_glue.streams.layout import PLAIN
@@ -58,8 +58,8 @@ def test_a_record_arrives_bit_by_bit(scheme, seal):
     reception = Reception(PLAIN, 1000.0, in_order=order, signed=seal is not None)
     with closing(listen(at, its)) as listener:
         thread = sent(at, its, what)
-        found = received(listener, 600, reception, timeout=20.0)
-        thread.join(5.0)
+        found = received(listener, 600, reception)
+        thread.join(60.0)
         index, command, measured, force = joined(found)
         assert np.array_equal(index, np.arange(600))
         assert np.array_equal(command, what.command)
@@ -68,7 +68,7 @@ def test_a_record_arrives_bit_by_bit(scheme, seal):
         assert listener.counts['messages'] == 600
     assert not +reception.counts
     stamps = np.array([s.stamp_ns for s in found])
-    assert (np.diff(stamps) > 0).all() and abs(stamps[0] * 1e-9 - time.time()) < 10.0
+    assert (np.diff(stamps) > 0).all() and abs(stamps[0] * 1e-9 - time.time()) < 120.0
 
 
 def test_datagrams_that_are_not_for_us_are_counted_and_left_out():
@@ -112,9 +112,10 @@ def test_a_sender_that_is_not_allowed_is_not_heard():
     for scheme in ('udp', 'tcp'):
         at = address(scheme)
         with closing(listen(at, terms(allow=('192.0.2.1',)))) as listener:
-            sent(at, terms(), record(20)).join(5.0)
-            assert received(listener, 1, timeout=0.5) == []
-            assert listener.counts['senders refused'] >= 1
+            sent(at, terms(), record(20)).join(60.0)
+            assert counted(listener, 'senders refused') == []
+            # Nor what else it sends.
+            assert listener.receive(0.1) == []
 
 
 def test_a_line_without_end_ends_the_connection_only():
@@ -123,11 +124,11 @@ def test_a_line_without_end_ends_the_connection_only():
     with closing(listen(at)) as listener:
         with closing(socket.create_connection(('127.0.0.1', port))) as hostile:
             hostile.sendall(b'9' * 100_000)
-            assert received(listener, 1, timeout=0.5) == []
+            assert counted(listener, 'malformed') == []
         assert listener.counts['malformed'] == 1 and len(listener._rest) == 0
         thread = sent(at, terms(), record(50))
         assert len(joined(received(listener, 50))[0]) == 50
-        thread.join(5.0)
+        thread.join(60.0)
 
 
 def test_a_broken_connection_without_counter_is_a_gap():
@@ -191,7 +192,7 @@ def site(port, answers):
     thread = threading.Thread(target=serve, daemon=True)
     thread.start()
     yield heard
-    thread.join(5.0)
+    thread.join(60.0)
 
 
 def test_the_shadow_of_openfresco_hears_everything_and_changes_nothing():
@@ -273,7 +274,7 @@ def test_a_stream_of_lsl_with_another_number_of_channels_is_not_heard(channels):
         name = at.removeprefix('lsl:')
         info = pylsl.StreamInfo(name, 'servo', channels, 1000.0, 'double64', f'{name}-sender')
         outlet = pylsl.StreamOutlet(info)
-        end = time.monotonic() + 20.0
+        end = time.monotonic() + 60.0
         while not listener.counts['malformed'] and time.monotonic() < end:
             outlet.push_sample([1.0] * channels)
             assert not listener.receive(0.2)

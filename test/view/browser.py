@@ -87,7 +87,7 @@ class Browser:
         await self._socket.close()
         await self._session.close()
         self._process.terminate()
-        self._process.communicate(timeout=20)
+        self._process.communicate(timeout=60)
         self._profile.cleanup()
 
     async def call(self, method: str, **parameters: Any) -> dict[str, Any]:

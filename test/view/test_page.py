@@ -495,15 +495,15 @@ def test_a_frame_that_fails_is_told_and_closes_the_socket(
     async def look() -> None:
         async with aiohttp.ClientSession() as session:
             async with session.ws_connect(own + '/socket', origin=own) as socket:
-                assert (await socket.receive(timeout=5.0)).type == aiohttp.WSMsgType.BINARY
+                assert (await socket.receive(timeout=60.0)).type == aiohttp.WSMsgType.BINARY
                 with monkeypatch.context() as broken:
                     broken.setattr(live.history, 'curves', None)
                     feed(live, 1000, 50)
-                    while (await socket.receive(timeout=5.0)).type == aiohttp.WSMsgType.BINARY:
+                    while (await socket.receive(timeout=60.0)).type == aiohttp.WSMsgType.BINARY:
                         pass
                 assert socket.close_code == 1011
             async with session.ws_connect(own + '/socket', origin=own) as socket:
-                assert (await socket.receive(timeout=5.0)).type == aiohttp.WSMsgType.BINARY
+                assert (await socket.receive(timeout=60.0)).type == aiohttp.WSMsgType.BINARY
 
     try:
         asyncio.run(look())
