@@ -121,6 +121,17 @@ class Process:
         self.process.wait()
 
 
+class NotReady(threading.Event):
+    """In place of a worker's `ready`: not before the test wants it, however soon the worker is."""
+
+    def set(self):
+        """Do nothing: the worker is ready."""
+
+    def come_true(self):
+        """Be ready."""
+        super().set()
+
+
 class Probe(Node):
     """Watches /diagnostics, publishes samples, calls services."""
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
+from ros_nodes import NotReady
 
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.prior_conflict import Conflict
@@ -164,7 +165,7 @@ def test_a_contradicted_prior_is_told_with_its_date_for_as_long_as_it_stands(nod
 
 
 def test_a_worker_that_compiles_is_no_health(node):
-    node.worker.ready = type(node.worker.ready)()  # not ready, however quick this computer is
+    node.worker.ready = NotReady()
     level, message, shown = told(node)
     assert level == DiagnosticStatus.WARN and 'still compiling' in message
     assert shown['worker'] == 'compiling'

@@ -1,7 +1,7 @@
 """Nodes listen when their workers can compute, and say what they wait for."""
 
 import pytest
-from ros_nodes import QUICK
+from ros_nodes import QUICK, NotReady
 
 from actuator_glue.nodes import diagnoser, estimator, topics
 from actuator_glue.nodes.executor import Executor
@@ -14,20 +14,19 @@ def test_samples_are_listened_to_once_the_worker_is_ready(make, probe):
     executor = Executor()
     executor.add_node(node)
     node.trigger_configure()
-    # Not ready, however quick this computer is.
-    begun, node.worker.ready = node.worker.ready, type(node.worker.ready)()
+    begun, node.worker.ready = node.worker.ready, NotReady()
     node.trigger_activate()
     topic = node.resolve_topic_name(topics.SAMPLES.name)
     for _ in range(30):
         executor.spin_once(0.02)
     assert node.count_subscribers(topic) == 0 and node.compiling
-    node.worker.ready.set()
+    node.worker.ready.come_true()
     probe.until(lambda: executor.spin_once(0.02) or node.count_subscribers(topic))
     if make is estimator.EstimatorNode:
         for ready, why in ((False, 'the worker is still compiling'), (True, 'took longer')):
-            node.worker.ready = type(begun)()
+            node.worker.ready = NotReady()
             if ready:
-                node.worker.ready.set()
+                node.worker.ready.come_true()
             node._tell([Dropped(3, 0)])
             assert why in node.health._faults['deadline'][1]
     node.worker.ready = begun
