@@ -10,9 +10,11 @@ from typing import NamedTuple
 # A step counts as late from here on [s]; the operating system's sleep is good for a tenth of it.
 LATE = 5e-3
 # A clock that is not the computer's own is looked at this often [s], and has jumped where it moves
-# on by more than this between two looks [s].
+# on by more than this between two looks [s], and by more than so many times what has passed on
+# this computer: a node that was held up has seen no jump.
 LOOK = 5e-3
 JUMP = 1.0
+FASTEST = 10.0
 
 
 class Step(NamedTuple):
@@ -56,7 +58,7 @@ class Pacer:
         self._clock = clock
         self._jumped = jumped
         self._stop = threading.Event()
-        self._start = self._seen = 0.0
+        self._start = self._seen = self._looked = 0.0
         self.late = 0
         self.latest = 0.0
         self._thread = threading.Thread(target=self._run, name='pacer', daemon=True)
@@ -94,6 +96,7 @@ class Pacer:
             if not begun:
                 # The first step is made before the stream begins: what it takes is not lateness.
                 self._start = self._seen = self._now()
+                self._looked = time.monotonic()
                 begun = True
             if self._speed > 0.0:
                 self._wait(step.due / self._speed)
@@ -110,8 +113,10 @@ class Pacer:
         while not self._stop.is_set():
             now = self._now()
             if self._clock is not None:
-                moved, self._seen = now - self._seen, now
-                if not 0.0 <= moved <= JUMP:
+                looked = time.monotonic()
+                moved, passed = now - self._seen, looked - self._looked
+                self._seen, self._looked = now, looked
+                if not 0.0 <= moved <= max(JUMP, FASTEST * passed):
                     self._start += moved
                     self._jumped()
             wait = self._start + due - now

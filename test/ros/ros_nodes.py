@@ -140,6 +140,7 @@ class Probe(Node):
         self.health = {}
         self.faults = defaultdict(str)
         self.reports = Counter()
+        self.stamps = {}
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
         self.index = 0
         self.callers = {}
@@ -149,6 +150,8 @@ class Probe(Node):
             node = status.name.strip('/')
             self.health[node] = {v.key: v.value for v in status.values}
             self.reports[node] += 1
+            stamp = message.header.stamp
+            self.stamps[node] = stamp.sec + 1e-9 * stamp.nanosec
             self.faults[node] += ''.join(
                 f'{v.key}: {v.value}\n' for v in status.values if v.key.endswith('(last)')
             )

@@ -45,7 +45,7 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
         table = np.column_stack([seconds, np.sin(seconds), np.sin(seconds - 0.02)])
         np.savetxt(file, table, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
         given = {'file': str(file), 'specimen_stiffness': 1e5}
-    process = start(node, use_sim_time=True, wait_for=1, **given)
+    process = start(node, use_sim_time=True, wait_for=1, diagnostics_period=0.1, **given)
     probe.until(lambda: len(blocks) > 40, what='samples')
 
     def stands():
@@ -65,6 +65,10 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
         """A second of the clock is a second of samples, wherever the clock jumps before."""
         before, then = stands()
         clock.jump(jump)
+        if jump:
+            # It goes on when that is known: a node that is held up meanwhile takes all for a jump.
+            probe.until(lambda: abs(probe.stamps[node] - clock.now) < 1.0, what='a jump is seen')
+            probe.for_reports(node, 3)
         clock.speed = speed
         probe.until(lambda: clock.now > then + jump + 1.0, what='the clock')
         after, now = stands()
@@ -200,3 +204,43 @@ def test_what_the_first_step_waits_for_is_no_lateness():
     assert over.wait(60.0)
     # The second step takes 0.7 s, for which the third is late.
     assert (pacer.late, pacer.latest) == (1, pytest.approx(0.7))
+
+
+def test_a_stream_that_was_held_up_has_seen_no_jump(monkeypatch):
+    """It catches up, as by the computer's own clock; what jumps meanwhile has jumped."""
+    now, steady, over, done, jumps = [0.0], [0.0], threading.Event(), [], []
+    monkeypatch.setattr(
+        'actuator_glue.nodes.pacer.time', SimpleNamespace(monotonic=lambda: steady[0])
+    )
+
+    def held_up(seconds, jump):
+        now[0] += seconds + jump
+        steady[0] += seconds
+        done.append(now[0])
+
+    steps = iter(
+        [
+            Step(0.0, partial(held_up, 3.0, 0.0)),
+            Step(2.0, partial(held_up, 3.0, 500.0)),
+            Step(3.5, partial(held_up, 0.0, 0.0)),
+        ]
+    )
+    pacer = Pacer(
+        steps,
+        lambda: True,
+        1.0,
+        lambda _: over.set(),
+        lambda: now[0],
+        lambda: jumps.append(now[0]),
+    )
+    pacer.start()
+    probed = time.monotonic() + 60.0
+    while len(done) < 2 and time.monotonic() < probed:
+        time.sleep(0.01)
+    # The second was late and done at once; the third waits for its time by the clock that jumped.
+    assert done == [3.0, 506.0]
+    while not jumps and time.monotonic() < probed:
+        time.sleep(0.01)
+    assert jumps == [506.0] and len(done) == 2
+    now[0] += 0.5
+    assert over.wait(60.0) and done == [3.0, 506.0, 506.5]
