@@ -117,7 +117,8 @@ class Pacer:
                 moved, passed = now - self._seen, looked - self._looked
                 self._seen, self._looked = now, looked
                 if not 0.0 <= moved <= max(JUMP, FASTEST * passed):
-                    self._start += moved
+                    # What is late by now is due now: stamps go on from here, and would run ahead.
+                    self._start = max(self._start + moved, now - due)
                     self._jumped()
             wait = self._start + due - now
             if wait <= 0.0:

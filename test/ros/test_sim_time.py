@@ -244,3 +244,25 @@ def test_a_stream_that_was_held_up_has_seen_no_jump(monkeypatch):
     assert jumps == [506.0] and len(done) == 2
     now[0] += 0.5
     assert over.wait(60.0) and done == [3.0, 506.0, 506.5]
+
+
+def test_after_a_jump_nothing_is_made_in_a_hurry():
+    """What was late before is due now: its stamps, made anew, would run ahead of the clock."""
+    now, over, done = [0.0], threading.Event(), []
+
+    def act(moved):
+        now[0] += moved
+        done.append(now[0])
+
+    # The second is late by 0.8 s when the clock jumps; the third comes 0.1 s after it.
+    moves = ((0.0, 0.9), (0.1, 500.0), (0.2, 0.0), (0.3, 0.0))
+    steps = (Step(due, partial(act, moved)) for due, moved in moves)
+    pacer = Pacer(steps, lambda: True, 1.0, lambda _: over.set(), lambda: now[0])
+    pacer.start()
+    end = time.monotonic() + 60.0
+    while len(done) < 3 and time.monotonic() < end:
+        time.sleep(0.01)
+    time.sleep(0.1)
+    assert done == [0.9, 500.9, 500.9]
+    now[0] += 0.11
+    assert over.wait(60.0) and done[3] == 501.01
