@@ -105,7 +105,7 @@ def test_a_recorder_that_is_ended_keeps_what_it_recorded(how, start, probe, tmp_
     killed = how == signal.SIGKILL
     # To a recorder that is told to end nothing is written before.
     recorder = start('recorder', bag=str(bag), **({} if killed else {'flush_period': 10.0}))
-    simulator = start('actuator_sim', rate=RATE, wait_for=1, block=2)
+    simulator = start('actuator_sim', rate=RATE, wait_for=2, block=2)
     heard = []
     probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos)
     probe.until(lambda: heard and heard[-1].index >= 600, what='samples')
