@@ -93,3 +93,34 @@ def test_a_text_that_ends_within_a_number_is_refused(
 @pytest.mark.parametrize('form', ['{:.4f}', '{:.9e}', '{:.7g}', '{}'])
 def test_a_text_may_end_without_a_line_end(form: str, tmp_path: Path) -> None:
     _check(_write(tmp_path / 'a.csv', _NAMES, '', form))
+
+
+@pytest.mark.parametrize(
+    ('usual', 'last'),
+    [
+        ('0.25', '0.3'),
+        ('1.5', '2'),
+        ('1.5e-10', '1e-10'),
+        ('0.50', 'nan'),
+        ('0.50', ''),
+        ('0.50', 'NA'),
+        ('v1.10', 'v2'),
+    ],
+)
+def test_what_ends_shorter_may_be_whole(usual: str, last: str, tmp_path: Path) -> None:
+    """At rest all numbers are alike; a gap or a remark is no number that was cut off."""
+    path = _write(tmp_path / 'a.csv', f'{_NAMES},state')
+    names, *rows = path.read_text().splitlines()
+    path.write_text(
+        '\n'.join([names, *(f'{row},{usual}' for row in rows[:-1]), f'{rows[-1]},{last}'])
+    )
+    _check(path)
+
+
+def test_a_time_of_a_whole_second_is_whole(tmp_path: Path) -> None:
+    rows = [f'{i / 500.0},1.0,0.5,08:00:00.{2000 * i:06d}' for i in range(_COUNT)]
+    path = tmp_path / 'a.csv'
+    path.write_text(
+        '\n'.join(['time_s,command_mm,measured_mm,stamp', *rows, '0.8,1.0,0.5,08:00:01'])
+    )
+    assert len(read(path).command) == _COUNT + 1

@@ -47,6 +47,7 @@ _STAMP = re.compile(
     r'(?: ?(?P<half>[ap])\.?m\.?)?(?: ?(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d))?',
     re.ASCII | re.IGNORECASE,
 )
+_ZERO = re.compile(r'[.,]\d*0(?:e|$)', re.IGNORECASE)  # a number written with all its digits
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
@@ -413,7 +414,8 @@ def read_columns(path: Path, head: TextHead, positions: list[int]) -> list[Array
 def _refuse_cut(path: Path, head: TextHead, rows: list[tuple[int, str]]) -> None:
     """Refuse a text that ends within its last number: a digit may be missing, or an exponent.
 
-    It has no line end there, and the number fewer digits behind its decimal sign than all before.
+    It has no line end there, and the number fewer digits behind its decimal sign than all before,
+    of which some end in zeros: without these they are as long as they come.
 
     Args:
         path: the file.
@@ -425,9 +427,10 @@ def _refuse_cut(path: Path, head: TextHead, rows: list[tuple[int, str]]) -> None
     """
     if len(rows) < _ENDS or rows[-1][1].endswith('\n'):
         return
-    entries = [(fields_of(line, head.delimiter) or [''])[-1] for _, line in rows]
+    entries = [fields_of(line, head.delimiter)[-1] for _, line in rows]
     *usual, found = [len(entry.partition(head.decimal)[2]) for entry in entries]
-    if len(set(usual)) == 1 and found < usual[0]:
+    cut = len(set(usual)) == 1 and found < usual[0] and any(map(str.isdigit, entries[-1]))
+    if cut and all(map(is_number, entries[:-1])) and any(map(_ZERO.search, entries[:-1])):
         raise InputError(
             f'{path}: the file is cut off within its last number, {entries[-1]!r} in line '
             f'{rows[-1][0]} (those before it have {usual[0]} characters behind the decimal sign, '
