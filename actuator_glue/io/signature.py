@@ -36,7 +36,7 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b'%PDF-', 'a PDF document', _TABLE),
     (b'\x89PNG', 'a picture', _TABLE),
     (b'\xff\xd8\xff', 'a picture', _TABLE),
-    (b'FEA1', 'a Feather file', _TABLE),
+    (b'FEA1\0', 'a Feather file', _TABLE),
     *((b'CDF' + n, 'a netCDF file of the classic kind', _NETCDF) for n in (b'\1', b'\2', b'\5')),
     *((b'\x80' + n, 'a Python pickle', _PICKLE) for n in (b'\2', b'\3', b'\4', b'\5')),
 )
@@ -45,6 +45,8 @@ _NO_TABLE = (
     (re.compile(rb'\s*(\{\s*"|\[\s*[\[{])'), 'JSON'),
     (re.compile(rb'\s*<(\?xml|!doctype|html|table)\b', re.IGNORECASE), 'XML or HTML'),
 )
+# A line of numbers alone: rows of a table, which may have a head of JSON or XML.
+_ROW = re.compile(rb'^[-+.\deE]+([;,|\t ]+[-+.\deE]+)+\s*$', re.MULTILINE)
 _ZIP = b'PK\x03\x04'
 # What a zip archive of that kind has in its first entries.
 _ZIPPED: tuple[tuple[bytes, str], ...] = (
@@ -168,8 +170,9 @@ def open_text(path: Path, errors: Literal['strict', 'replace'] = 'strict') -> Te
         InputError: the file cannot be read, or is no text, or one that holds no table.
     """
     encoding, start = text_encoding(path), beginning(path)
+    plain = unmarked(start)
     for mark, what in _NO_TABLE:
-        if mark.match(unmarked(start)):
+        if mark.match(plain) and not _ROW.search(plain):
             raise InputError(f'{path}: this is {what}, not a table of numbers; {_TABLE}')
     doubled = '\r\r\n' in start.decode(encoding, 'replace')
     try:

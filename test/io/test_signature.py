@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuator_glue.cli.main import main
 from actuator_glue.errors import LONGEST, InputError
 from actuator_glue.io.channel_map import read_channel_map
 from actuator_glue.io.laboratory import read
@@ -77,6 +78,17 @@ def test_text_that_is_no_table_is_named(
     for use in (read, look):
         with pytest.raises(InputError, match=f'this is .*{name}.*, not a table of numbers; save'):
             use(path)
+
+
+@pytest.mark.parametrize(
+    'head', ['{"run": 5}', '{\n"run": 5\n}', '<?xml version="1"?>', 'FEA1 model']
+)
+def test_a_table_below_such_a_head_is_read(tmp_path: Path, head: str) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text(f'{head}\n{text()}')
+    made = tmp_path / 'map.yaml'
+    assert main(['map', str(path), '--out', str(made)]) == 0
+    assert read(path, channels=made).rate == 100.0
 
 
 @pytest.mark.parametrize(
