@@ -63,6 +63,25 @@ def test_a_sign_of_inches_opens_no_quote(tmp_path: Path) -> None:
     _check(_write(tmp_path / 'a.csv', f'{_NAMES},remark 5"'))
 
 
+def test_signs_of_inches_in_rows_or_a_title_end_no_name(tmp_path: Path) -> None:
+    path = _write(tmp_path / 'a.csv', f'{_NAMES},size 5"')
+    names, *rows = path.read_text().splitlines()
+    path.write_text('\n'.join([names, *(f'{row},3"' for row in rows)]))
+    _check(path)
+    path = _write(
+        tmp_path / 'b.txt', 'Rod of 5" length\nTime [s],Command [mm],Stroke of 5" [mm],Load [N]'
+    )
+    assert main(['map', str(path), '--out', str(tmp_path / 'map.yaml')]) == 0
+    _check(path, channels=tmp_path / 'map.yaml')
+
+
+def test_numbers_of_samples_are_no_comments(tmp_path: Path) -> None:
+    path = _write(tmp_path / 'a.csv', f'id,{_NAMES}')
+    names, *rows = path.read_text().splitlines()
+    path.write_text('\n'.join([names, *(f'#{i},{row}' for i, row in enumerate(rows))]))
+    _check(path)
+
+
 @pytest.mark.parametrize(
     'head',
     [

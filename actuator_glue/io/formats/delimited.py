@@ -50,6 +50,7 @@ _STAMP = re.compile(
 _ZERO = re.compile(r'[.,]\d*0(?:e|$)', re.IGNORECASE)  # a number written with all its digits
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
+_OPEN = re.compile(r'(?:^|[;\t,|])\s*"[^"]*$')  # a quoted entry that does not end in its line
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
 # Numbers of a fixed width without a blank between them, and what to do.
 _TOUCHING = re.compile(r'\d[+-]\d|\.\d+\.\d')
@@ -129,13 +130,19 @@ def read_head(
     elif len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
     else:
-        first = _opened(top, header_lines - 1)
-        line = uncommented(' '.join(top[first:header_lines])) if header_lines else ''
+        firsts = range(max(header_lines - _BROKEN, 0), header_lines - 1)
+        broken = (i for i in firsts if _broken(top[i:header_lines]))
+        line = ' '.join(top[next(broken, max(header_lines - 1, 0)) : header_lines])
+        line = uncommented(line)
     below = header_lines
     while line and not units and below < len(top):
         text, below = uncommented(top[below]), below + 1
-        units = units_line(fields_of(text, delimiter or _of_units(line, text)))
-        if units or _COMMENT.match(top[below - 1]):
+        by = delimiter or _of_units(line, text)
+        entries = fields_of(text, by)
+        units = units_line(entries)
+        # A number behind a `#` may be that of a sample.
+        row = len(entries) == len(fields_of(line, by)) and sum(map(is_number, entries)) > 1
+        if units or (_COMMENT.match(top[below - 1]) and not row):
             _take_note(text, notes, path)
             header_lines = below
         elif text.strip(_NOTHING):
@@ -181,7 +188,7 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
     entries = fields_of(top[at], _best_delimiter('', top[at]))
     if len(entries) < 2 or not all(map(is_number, entries)):
         ends = range(at + 1, min(at + _BROKEN, len(top)) + 1)
-        stop = next((end for end in ends if _closed(top[at:end])), at + 1)
+        stop = next((end for end in ends if _broken(top[at:end])), at + 1)
         return stop, ' '.join(top[at:stop]), notes
     if entries in ([str(i + start) for i in range(len(entries))] for start in (0, 1)):
         raise InputError(
@@ -192,15 +199,13 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
     return at, line, notes
 
 
-def _opened(top: list[str], last: int) -> int:
-    """Return the line in which a name begins that ends in line `last`: quoted, with line ends."""
-    firsts = range(last, max(last - _BROKEN, -1), -1)
-    return next((first for first in firsts if _closed(top[first : last + 1])), last)
+def _broken(lines: list[str]) -> bool:
+    """Whether a name in quotes begins in the first of some lines and one ends in the last.
 
-
-def _closed(lines: list[str]) -> bool:
-    """Whether every quote that begins in some lines ends there."""
-    return sum(line.count('"') for line in lines) % 2 == 0
+    Other names may be broken off and go on in lines between. A single quote may mean inches.
+    """
+    odd = [line.count('"') % 2 for line in lines]
+    return odd == [1, *[0] * (len(lines) - 2), 1] and _OPEN.search(lines[0]) is not None
 
 
 def _take_note(comment: str, notes: dict[str, str], path: Path) -> bool:
