@@ -25,6 +25,7 @@ from actuator_glue.io.units import (
     ROLES,
     choose,
     contradict,
+    is_unit,
     of_file,
     recognise,
     symbol,
@@ -237,8 +238,9 @@ def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
     """Refuse a file whose only column for a role holds no numbers: it would be left out unseen."""
     found = {role for c in table.columns for role, _ in [recognise(c.label) or ('', '')]}
     for label, kind in table.unread.items():
-        role, _ = recognise(label) or ('', '')
-        if role in roles - found:
+        role, unit = recognise(label) or ('', '')
+        # `force_mode` is no force, and what is true or false none that was kept as text.
+        if role in roles - found and (not unit or is_unit(unit)) and 'bool' not in kind.lower():
             raise InputError(
                 f'{path}: column {label!r} holds {kind} and no real numbers; save it as such, or '
                 f'give it another name if it is not {role}'

@@ -71,3 +71,20 @@ def test_a_word_is_no_column(tmp_path):
     for remark in ('of the load cell, not recorded', ['load cell A', 'not recorded']):
         _hdf5(tmp_path / 'a.h5', {**_GOOD, 'force': remark})
         assert read(tmp_path / 'a.h5').force is None
+
+
+@pytest.mark.parametrize(
+    ('write', 'name', 'extra'),
+    [
+        (_parquet, 'a.parquet', {'force_mode': _TEXT}),
+        (_parquet, 'a.parquet', {'force': _TIME > 1.0}),
+        (_hdf5, 'a.h5', {'force_sensor': _TEXT}),
+        (_hdf5, 'a.h5', {'force': _TIME > 1.0}),
+        (_hdf5, 'a.h5', {'list': np.array([(b'a', b'N')], [('name', 'S1'), ('force', 'S1')])}),
+        (_tdms, 'a.tdms', {'force_mode': _TEXT}),
+        (_mat, 'a.mat', {'force': 1.0 + 2.0j}),
+    ],
+)
+def test_what_is_about_a_force_is_none(write, name, extra, tmp_path):
+    write(tmp_path / name, {**_GOOD, **extra})
+    assert read(tmp_path / name).force is None

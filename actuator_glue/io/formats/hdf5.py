@@ -132,9 +132,10 @@ class _Tree:
             if few and _CLASS not in dataset.attrs:  # cells are left alone
                 self._take_structs(dataset, shown, depth + 1)
         elif fields and dataset.ndim == 1:  # a table: one column per field
-            kinds = {f: dataset.dtype[f] for f in fields}
-            self.unread |= {f: _kind(k) for f, k in kinds.items() if k.kind not in 'fiu'}
-            fields = [f for f in fields if dataset.dtype[f].kind in 'fiu']
+            others = [f for f in fields if dataset.dtype[f].kind not in 'fiu']
+            if dataset.size > A_REMARK:
+                self.unread |= {f: _kind(dataset.dtype[f]) for f in others}
+            fields = [f for f in fields if f not in others]
             self.columns += [Column(f'{shown}.{f}', f) for f in fields]
             self.places += [(place, f) for f in fields]
         elif dataset.dtype.kind in 'fiu' and not (_is_text(dataset) or _OBJECT in dataset.attrs):

@@ -15,6 +15,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.file_notes import NOTES
 from actuator_glue.io.formats import (
+    A_REMARK,
     Column,
     FileTable,
     Format,
@@ -64,7 +65,7 @@ def _collect(name: str, value: Any, arrays: dict[str, Any], texts: dict[str, str
                 _collect(f'{name}({i})', entry, arrays, texts)
     else:
         array = np.atleast_1d(np.asarray(value))
-        if array.dtype.kind in 'fiuc' and array.ndim <= 2:
+        if array.dtype.kind in ('fiuc' if array.size > A_REMARK else 'fiu') and array.ndim <= 2:
             arrays[name] = array
 
 
