@@ -107,6 +107,31 @@ def test_of_several_sheets_with_a_record_it_is_told_which_is_read(tmp_path: Path
     assert line.startswith(f"{path}: sheet 'run 1' is read, and 'run 2' could be as well")
 
 
+@pytest.mark.parametrize('first', [False, True])
+def test_a_sheet_of_peaks_or_settings_is_no_record(tmp_path: Path, first: bool) -> None:
+    """Neither read in place of one nor told, whatever it shares with it."""
+    peaks = [['cycle', 'command_mm', 'measured_mm'], *[[i, 7.0, 6.5 + i] for i in range(9)]]
+    path = _sheets(
+        tmp_path / 'a.xlsx',
+        {'peaks': peaks, 'run': _RUN} if first else {'run': _RUN, 'peaks': peaks},
+    )
+    told: list[str] = []
+    np.testing.assert_allclose(read(path, warn=told.append).command, COMMAND * 1e-3)
+    gains = [['gain', 'value', 'least', 'most'], *[[i, 1.0, 0.0, 2.0] for i in range(9)]]
+    path = _sheets(tmp_path / 'a.xlsx', {'run': _RUN, 'gains': gains})
+    mapped = tmp_path / 'map.yaml'
+    mapped.write_text(
+        '\n'.join(
+            f'{r}: {{column: {i}, unit: {u}}}'
+            for r, i, u in (('time', 1, 's'), ('command', 2, 'mm'), ('measured', 3, 'mm'))
+        )
+    )
+    np.testing.assert_allclose(
+        read(path, channels=mapped, warn=told.append).command, COMMAND * 1e-3
+    )
+    assert not told
+
+
 def test_a_name_merged_over_two_rows_is_a_name(tmp_path: Path) -> None:
     head = [['time_s', 'Displacement', None], [None, 'command_mm', 'measured_mm']]
     path = _sheets(tmp_path / 'a.xlsx', {'run': [*head, *_ROWS]})

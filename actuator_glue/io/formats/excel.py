@@ -57,7 +57,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     {},
                     partial(_chosen, table),
                     entry=partial(_place, skip, columns),
-                    told=_told([one[0].title for one in whole]),
+                    told=_told([one[0].title for one in whole if _alike(one[3], columns)]),
                 )
         finally:
             book.close()
@@ -68,12 +68,17 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
 
 
 def _holds(columns: list[Column], channels: ChannelMap | None) -> bool:
-    """Whether a sheet has the command and the measured channel."""
-    labels: set[str | int] = {name for c in columns for name in (c.name, c.label)}
+    """Whether a sheet has all channels that a record needs."""
     if channels is None:
-        return {'command', 'measured'} <= {bare(column.label) for column in columns}
-    wanted = {c.column for c in (channels.command, channels.measured)}
+        return {'time', 'command', 'measured'} <= {bare(column.label) for column in columns}
+    labels: set[str | int] = {name for c in columns for name in (c.name, c.label)}
+    wanted = {channel.column for channel in channels.roles().values()}
     return wanted <= labels.union(range(1, len(columns) + 1))
+
+
+def _alike(one: list[Column], other: list[Column]) -> bool:
+    """Whether two sheets have a name in common: the numbers of a map fit any sheet."""
+    return not {c.name for c in one}.isdisjoint(c.name for c in other)
 
 
 def _told(sheets: list[str]) -> tuple[str, ...]:
