@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,14 +52,15 @@ def run(args: argparse.Namespace) -> int:
     if args.rate is not None and not args.rate > 0.0:
         raise InputError(f'--rate {args.rate:g}: give samples per second, more than 0')
     proposal = propose(found, args.rate)
-    plain = not _fault(args.file, None)
+    tell = cache(note)  # what is told of both readings is told once
+    plain = not _fault(args.file, None, tell)
     rows = [_row(column, found) for column in found.columns]
     title = f'{args.file}: {found.what}, {len(found.columns)} columns of numbers'
     table(title, ('column', 'unit', 'samples', 'least', 'greatest', 'remark'), rows, args)
     # A bag that we recorded says what its channels are; no other topic of it is a channel.
     ours = plain and found.what == 'bag'
     text = map_text(found, proposal) if proposal.complete and not ours else ''
-    refused = _fault(args.file, text) if text else '' if ours else _missing(found, proposal)
+    refused = _fault(args.file, text, tell) if text else '' if ours else _missing(found, proposal)
     if text:
         for line in text.splitlines():
             say(line, args)
@@ -109,7 +112,7 @@ def _quoted(value: str | int) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _fault(path: str, text: str | None) -> str:
+def _fault(path: str, text: str | None, tell: Callable[[str], None]) -> str:
     """Return why the file cannot be read with a map, or without; empty where it can."""
     from actuator_glue.io.channel_map import parse_channel_map
     from actuator_glue.io.load import load_records
@@ -117,7 +120,7 @@ def _fault(path: str, text: str | None) -> str:
 
     try:
         channels = text and parse_channel_map(parse(text, 'proposed map'), 'proposed map')
-        load_records(path, channels=channels or None, gap=note, warn=note)
+        load_records(path, channels=channels or None, gap=tell, warn=tell)
     except InputError as error:
         return f'with this map the file is refused: {error}'
     return ''

@@ -7,6 +7,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.look import look
@@ -98,13 +99,15 @@ def test_the_sheet_with_the_channels_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(path, channels=mapped).command, COMMAND * 1e-3)
 
 
-def test_of_several_sheets_with_a_record_it_is_told_which_is_read(tmp_path: Path) -> None:
+def test_of_several_sheets_with_a_record_it_is_told_which_is_read(tmp_path: Path, capsys) -> None:
     second = [_RUN[0], *[[t, 2.0 * c, m] for t, c, m in _ROWS]]
     path = _sheets(tmp_path / 'a.xlsx', {'run 1': _RUN, 'run 2': second, 'end': _SUMMARY})
     told: list[str] = []
     np.testing.assert_allclose(read(path, warn=told.append).command, COMMAND * 1e-3)
     (line,) = told
     assert line.startswith(f"{path}: sheet 'run 1' is read, and 'run 2' could be as well")
+    assert main(['map', str(path)]) == 0
+    assert capsys.readouterr().err.count('could be as well') == 1
 
 
 @pytest.mark.parametrize('first', [False, True])
