@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -37,6 +38,8 @@ from actuator_glue.records import Array, Hold, Record
 _REST_SHARE = 0.1
 # A rate that is wanted is another one than the file's if it differs by this share.
 _OTHER_RATE = 1e-3
+# The end of `pos_m` or `cmd_in` may be no unit: whoever makes a channel map knows.
+_NO_UNIT = re.compile(r'_(?:\w|in)$')
 _NEEDED = ('time', 'command', 'measured')
 
 
@@ -270,9 +273,10 @@ def _mapped(
 def _unlike_map(table: FileTable, roles: dict[str, Channel]) -> Iterator[str]:
     """Yield where a map gives another unit than the file does, and no scale between them."""
     for role, channel in roles.items():
-        at = position(channel.column, table.columns, role)
-        column = table.columns[at] if at < len(table.columns) else Column('', '')
-        said = symbol(column.unit) or written_unit(column.label)
+        column = table.columns[position(channel.column, table.columns, role)]
+        said = symbol(column.unit)
+        if not said and (recognise(column.label) or not _NO_UNIT.search(column.label)):
+            said = written_unit(column.label)
         if channel.scale == 1.0 and contradict(channel.unit, said):
             yield (
                 f'{role}: the channel map says {channel.unit!r}, and the file {said!r} of column '

@@ -131,3 +131,16 @@ def test_another_unit_than_the_file_gives_is_told(
     assert record.command[1] == pytest.approx(scale * {'in': 25.4e-3, 'mm': 1e-3}[unit])
     assert bool(said) == bool(told)
     assert all(told in line for line in said)
+
+
+def test_letters_behind_a_name_contradict_no_map(tmp_path: Path) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text('cmd_in,pos_m\n' + ''.join(f'{i},{i}\n' for i in range(20)))
+    content = {
+        'command': {'column': 'cmd_in', 'unit': 'mm'},
+        'measured': {'column': 2, 'unit': 'mm'},
+        'rate': 100,
+    }
+    said: list[str] = []
+    read(path, channels=parse_channel_map(content, 'map'), warn=said.append)
+    assert not said
