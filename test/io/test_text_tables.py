@@ -299,6 +299,13 @@ def test_a_delimiter_in_quotes_parts_no_name_either(tmp_path: Path) -> None:
         read(path)
 
 
+def test_of_names_with_blanks_between_blanks_a_map_is_told(tmp_path: Path) -> None:
+    path = tmp_path / 'a.txt'
+    path.write_text('Time [s] Command [mm] Measured [mm]\n' + '0.1 1.5 2.5\n' * 9)
+    with pytest.raises(InputError, match='6 names, but 3 entries.*--channels'):
+        read(path)
+
+
 @pytest.mark.parametrize('form', ['{:7.3f}{:8.4f}{:8.4f}{:6.0f}', '{:5.3f}{:8.4f}{:8.4f}{:7.0f}'])
 def test_numbers_that_touch_are_told(tmp_path: Path, form: str) -> None:
     """Columns of a fixed width, too narrow for some rows or for all."""

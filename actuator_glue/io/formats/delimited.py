@@ -600,16 +600,12 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         )
         wanted = [channel.column for channel in channels.roles().values()]
         by_name = any(isinstance(column, str) for column in (*wanted, channels.sample_number))
-    if by_name and head.delimiter is None and 0 < head.width < head.named:
-        raise InputError(
-            f'{path}: cannot read the samples: {head.named} names, but {head.width} entries in '
-            f'the first row; if {_TOUCH}'
-        )
     if by_name and head.named and not head.names:
+        touching = head.delimiter is None and head.width < head.named
         raise InputError(
             f'{path}: cannot read the samples: {head.named} names, but {head.width} entries in '
             'the first row; give each column a name, or describe the file with --channels '
-            'MAP.yaml, which `actuator-glue map` proposes'
+            'MAP.yaml, which `actuator-glue map` proposes' + f'; if {_TOUCH}' * touching
         )
     stated = channels is not None and channels.decimal is not None
 
