@@ -176,7 +176,8 @@ def test_a_short_gap_between_segments_of_tdms_is_told(tmp_path: Path) -> None:
         read(stamped(tmp_path / 'a.tdms', *starts), warn=told.append)
         assert f'from sample {at * every} on begin some 1' in told.pop()
         assert not told
-    for late in ([0.0, 9.0, 3.0, 14.0, 2.0, 8.0, 0.0, 1.0], [0.02 * i for i in range(8)]):
+    odd = [0.0, 9.0, 3.0, 14.0, 2.0, 8.0, 0.0, 1.0]
+    for late in (odd, [*odd[:7], 19.0], [-5.0, *odd[1:]], [0.02 * i for i in range(8)]):
         starts = [later(i * every + j) for i, j in enumerate(late)]
         read(stamped(tmp_path / 'a.tdms', *starts), warn=told.append)
         assert not told

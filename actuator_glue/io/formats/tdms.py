@@ -193,16 +193,18 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
 def _late_for_good(clock: _Clock, late_at: list[tuple[int, float]]) -> str:
     """Return in words where segments begin late, and all later ones too; nothing elsewhere.
 
-    Stamps of a computer come late now and then; where samples are missing all later ones do.
+    Stamps of a computer come late now and then; where samples are missing all later ones do, by
+    more than those before the gap differ, and those behind it.
 
     Args:
         clock: of the waveform.
         late_at: first sample of each segment, and how late it is [s].
     """
     at, late = np.array(late_at).T
-    after = np.minimum.accumulate(late[::-1])[::-1][1:]
-    steps = after - np.maximum.accumulate(late)[:-1]
-    beyond = steps - (_DRIFT * np.diff(at) + _LATE_SAMPLES) * clock.period
+    first, last = _range(late)[:, :-1], _range(late[::-1])[:, ::-1][:, 1:]
+    steps = last[0] - first[1]
+    beyond = steps - np.maximum(first[1] - first[0], last[1] - last[0])
+    beyond -= (_DRIFT * np.diff(at) + _LATE_SAMPLES) * clock.period
     if not len(steps) or beyond.max() < 0.0:
         return ''
     found = int(beyond.argmax())
@@ -211,6 +213,11 @@ def _late_for_good(clock: _Clock, late_at: list[tuple[int, float]]) -> str:
         f'{1e3 * steps[found]:.3g} ms late; taken as stamps that came late, but samples may be '
         'missing there'
     )
+
+
+def _range(values: Array) -> Array:
+    """Return the least and the greatest of some values up to each one, shape (2, n)."""
+    return np.array([np.minimum.accumulate(values), np.maximum.accumulate(values)])
 
 
 def _ahead(one: _Clock, other: _Clock) -> float:
