@@ -160,9 +160,20 @@ def _clock(columns: list[ColumnLook]) -> Guess | None:
         even_clock = column.rate is not None and not uneven(column.steps)
         reasons.append('goes on evenly' if even_clock else 'goes on, in uneven steps')
     guess = _guess(column, 'time', tuple(reasons))
-    others = [_name(c) for c in named if c is not column and c.steps is not None]
+    others = [_name(c) for c in named if c.steps is not None and _differ(c, column)]
     doubt = f'role: {", ".join(others)} may be it as well; channels need the same times'
     return _unsure(guess, (doubt,) * bool(others))
+
+
+def _differ(one: ColumnLook, other: ColumnLook) -> bool:
+    """Whether two columns of times overlap and differ: clocks of two channels.
+
+    Milliseconds beside seconds are one clock, and so is a time of day beside one
+    that begins at 0.
+    """
+    a, b = (c.values[[0, -1]] * ROLES['time'].get(c.unit, 1.0) for c in (one, other))
+    apart = float(np.abs(a - b).max()) * 2.0 * len(other.values)
+    return bool(a[0] < b[1] and b[0] < a[1] and apart > b[1] - b[0])
 
 
 def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float | None:

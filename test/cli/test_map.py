@@ -114,6 +114,19 @@ def test_a_second_column_of_times_is_told(tmp_path: Path) -> None:
     assert 'Time 2 [s] may be it as well' in told
 
 
+@pytest.mark.parametrize(
+    ('name', 'factor', 'first'),
+    [('Elapsed [s]', 1.0, 0.0), ('Time [ms]', 1e3, 0.0), ('Epoch time [s]', 1.0, 1.7e9)],
+)
+def test_one_clock_written_twice_is_no_second_one(
+    tmp_path: Path, name: str, factor: float, first: float
+) -> None:
+    command, measured, _ = channels()
+    head = f'Time [s],Command [mm],{name},Position [mm]'
+    path = write(tmp_path / 'a.csv', head, [TIME, command, first + factor * TIME, measured])
+    assert not looked(tmp_path, path)['channels']['time']['check']
+
+
 @pytest.mark.parametrize('first', [45_415.0, 739_375.25])
 def test_days_are_proposed_as_such(tmp_path: Path, first: float) -> None:
     """A spreadsheet counts them since 1900, MATLAB since year 0; never a rate in place of them."""
