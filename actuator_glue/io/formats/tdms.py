@@ -194,7 +194,7 @@ def _late_for_good(clock: _Clock, late_at: list[tuple[int, float]]) -> str:
     """Return in words where segments begin late, and all later ones too; nothing elsewhere.
 
     Stamps of a computer come late now and then; where samples are missing all later ones do, by
-    more than those before the gap differ, and those behind it.
+    more than those before the gap differ, and those behind it. Two segments alone do not tell.
 
     Args:
         clock: of the waveform.
@@ -205,7 +205,7 @@ def _late_for_good(clock: _Clock, late_at: list[tuple[int, float]]) -> str:
     steps = last[0] - first[1]
     beyond = steps - np.maximum(first[1] - first[0], last[1] - last[0])
     beyond -= (_DRIFT * np.diff(at) + _LATE_SAMPLES) * clock.period
-    if not len(steps) or beyond.max() < 0.0:
+    if len(steps) < 2 or beyond.max() < 0.0:
         return ''
     found = int(beyond.argmax())
     return (
