@@ -278,10 +278,11 @@ def _unlike_map(table: FileTable, roles: dict[str, Channel]) -> Iterator[str]:
         if not said and (recognise(column.label) or not _NO_UNIT.search(column.label)):
             said = written_unit(column.label)
         if channel.scale == 1.0 and contradict(channel.unit, said):
+            own = f'`unit: {said}`, or ' if said in ROLES[role] else ''
             yield (
                 f'{role}: the channel map says {channel.unit!r}, and the file {said!r} of column '
-                f'{column.name.strip()!r}; the map counts. If the file is right, give '
-                f'`unit: {said}`, or {channel.unit} per {said} as `scale`'
+                f'{column.name.strip()!r}; the map counts. If the file is right, give {own}'
+                f'{channel.unit} per {said} as `scale`'
             )
 
 
