@@ -110,7 +110,7 @@ ORPHAN = """
 import time
 from functools import partial
 from actuator_glue.workers.worker import Worker
-worker = Worker(print, partial(time.sleep, %s))
+worker = Worker(lambda answer: None, partial(time.sleep, %s))
 worker.submit(time.sleep, 600.0)
 print(worker._process.pid, %s or worker.ready.wait(60.0), flush=True)
 time.sleep(600.0)
@@ -124,10 +124,12 @@ def test_it_ends_with_who_asks_whatever_it_does(warm):
     asking = subprocess.Popen(
         [sys.executable, '-c', script], stdout=subprocess.PIPE, text=True, bufsize=1
     )
-    pid, ready = asking.stdout.readline().split()
-    assert ready != 'False'
-    os.kill(asking.pid, signal.SIGKILL)
-    asking.wait()
+    try:
+        pid, ready = asking.stdout.readline().split()
+        assert ready != 'False'
+    finally:
+        asking.kill()
+        asking.wait()
     end = time.monotonic() + 60.0
     while Path(f'/proc/{pid}').exists() and 'Z' not in state(pid):
         assert time.monotonic() < end, 'it is still there'
