@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,13 +32,16 @@ from actuator_glue.hybrid.ground_motion import GroundMotion
 from actuator_glue.hybrid.margin import classical_margins, nominal, pure_delay_margin
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.hybrid.stability import Flags
-from actuator_glue.hybrid.virtual import VirtualTest
+from actuator_glue.hybrid.virtual import DIVERGED, VirtualTest
 from actuator_glue.io.ground_motion import read_ground_motion
 from actuator_glue.io.partition import read_partition
 from actuator_glue.records import Array
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 DRAWS = 1000
+# Logarithm of a growth with which linear loops diverge within a record: from a fifth of the
+# reference's peak to five times it.
+_ENOUGH = 2.0 * math.log(DIVERGED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,9 +153,10 @@ def rths(
     notes = _notes(loop, calibration, chosen, by_test)
     if virtual is not None and by_test:
         unstable = virtual.diverged
-        # A draw that grows slowly diverges after the record only. Coefficients that adapt leave
-        # the roots of the first ones behind.
-        slow = ~responses.diverged & (growth > 0.0) & (not chosen.adaptive)
+        # A draw that grows slowly diverges after the record only; one that had the time is held by
+        # its nonlinear effects. Coefficients that adapt leave the roots of the first ones behind.
+        grown = growth * virtual.duration_s
+        slow = ~responses.diverged & (grown > 0.0) & (grown < _ENOUGH) & (not chosen.adaptive)
         if slow.any():
             either = stability.share(responses.diverged | slow, effective)
             unstable = replace(unstable, upper=either.upper)

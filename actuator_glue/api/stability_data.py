@@ -51,8 +51,8 @@ class StabilityData:
         delay_margin: without an actuator, by its pure delay.
         margins: gain and phase margin of the same loop, and with the mean actuator.
         p_unstable: share of draws that are unstable. Where a virtual test tells, its upper limit
-            counts draws, too, that do not diverge in its time but have an unstable loop without
-            the nonlinear effects.
+            counts draws, too, that are unstable without the nonlinear effects but grow too slowly
+            to diverge in its time.
         unstable_by: how that is told: by 'characteristic roots' in the right half plane; or by
             the 'virtual test', where the model is not linear or the compensator adapts.
         margin_s: further delay that the draws can bear; negative for unstable ones, where it is

@@ -259,6 +259,18 @@ def test_a_record_too_short_for_slow_growth_is_no_go() -> None:
     assert calm.go(0.1) and not any('diverge' in line for line in calm.notes)
 
 
+def test_a_loop_that_friction_holds_is_no_slow_growth() -> None:
+    """Without friction each draw would grow 50 times or more in 40 s: long enough."""
+    rubbing = posterior(0.002, ('coulomb-friction',))
+    rubbing.draws[..., Structure(('coulomb-friction',)).columns('coulomb-friction')] = 300.0
+    held = ag.rths(
+        structure(0.9 * LAG * np.pi, rate=512.0), rubbing, draws=64, ground_motion='artificial'
+    )
+    assert held.growth_per_s.lower > 0.1
+    assert held.virtual is not None and held.p_unstable == held.virtual.diverged
+    assert held.go(0.1) and not any('diverge' in line for line in held.notes)
+
+
 def test_a_virtual_test_shows_how_far_it_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
