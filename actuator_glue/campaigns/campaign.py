@@ -179,11 +179,13 @@ class _CampaignRun:
                         # Whatever ended their workers was one of those: now each is by itself.
                         self._compute(client, suspects, keys, told, alone=True)
                 except _EndedError as error:
-                    self.rows.gather(keys)
+                    held = ''
+                    if told.now.done:
+                        self.rows.gather(keys)
+                        held = f', which {self.rows.folder / RESULTS} holds'
                     raise InputError(
-                        f'{error}; {told.now.done} of {told.now.total} groups have their rows, '
-                        f'which {self.rows.folder / RESULTS} holds: run the same command again, '
-                        'and it makes the others'
+                        f'{error}; {told.now.done} of {told.now.total} groups have their rows'
+                        f'{held}: run the same command again, and it makes the others'
                     ) from error
             table = self.rows.gather(keys)
         return CampaignResult(self.rows.folder, told.now, table)

@@ -7,13 +7,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from distributed import LocalCluster
 from tiny_analysis import ANALYSIS
 
 import actuator_glue as ag
+from actuator_glue.campaigns import campaign
 from actuator_glue.campaigns.progress_file import Progress, read_progress
 from actuator_glue.campaigns.recipe import Recipe
 from actuator_glue.campaigns.rows import RowFolder, read_results
@@ -152,6 +155,18 @@ def test_a_scheduler_that_goes_leaves_a_table_and_says_how_to_go_on(
         ag.campaign(folder, out, scheduler=address, analysis=ANALYSIS, progress=end)
     assert f'{out / "results.parquet"} holds: run the same command again' in str(told.value)
     assert sorted(read_results(out)['group']) == ['0.csv', '1.csv']
+
+
+def test_a_scheduler_that_goes_before_any_row_leaves_no_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An empty one would be taken for a table of no campaign."""
+    (tmp_path / '0.csv').write_text('sleep 0 0')
+    client = Mock(nthreads=Mock(side_effect=OSError))
+    monkeypatch.setattr(campaign, 'connected', lambda *_: nullcontext(client))
+    with pytest.raises(ag.InputError, match='0 of 1 groups have their rows: run the same'):
+        ag.campaign(tmp_path, tmp_path / 'out', analysis=ANALYSIS)
+    assert not (tmp_path / 'out' / 'results.parquet').exists()
 
 
 @pytest.mark.slow
