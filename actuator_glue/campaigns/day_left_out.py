@@ -23,7 +23,7 @@ from actuator_glue.records import Array
 _LEAST, _MANY = 3, 20
 # Standard deviation of a day that tells nothing, and draws of walk and offset without a day.
 _NOTHING, _DRAWS = 1e6, 256
-_PRIOR = 2.0  # of p-values of few days
+_PRIOR = 3.0  # of p-values of few days
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,10 +61,10 @@ def left_out(series: Series, together: Pooled) -> LeftOut:
     deviation, spread = (
         np.stack([day[k][:, t] for t, day in enumerate(days)], axis=1) for k in (0, 1)
     )
-    # Walk and offset are hardly known: tails are heavy. Averaged for one parameter they
-    # nearly hold their level; those of a sum of squares of several would not. Nearly: the prior
-    # has most offsets below what a test knows, so that one in 10 histories of 5 to 7 days had an
-    # outlier by chance; with the factor it is one in 40 (360 histories, seeds of their own).
+    # Walk and offset are hardly known: tails are heavy. Averaged for one parameter they nearly
+    # hold their level; those of a sum of squares of several would not. Nearly: the prior has most
+    # offsets below what a test knows, so that one in 10 histories of 5 to 12 days had an outlier
+    # by chance; with a factor of 2 it is one in 18 (2400 histories), with 3 one in 33 (500).
     far = np.abs(deviation) / np.sqrt(np.diagonal(spread, axis1=2, axis2=3))
     each = np.clip(2.0 * norm.sf(far).mean(axis=0), 1e-300, 1.0 - 1e-9)
     middle = deviation.mean(axis=0)

@@ -57,7 +57,7 @@ def test_the_other_days_tell_a_day_as_one_large_normal_does(tmp_path: Path) -> N
         assert found.p_value[day] == pytest.approx(p, rel=1e-3)
 
 
-@pytest.mark.parametrize('days', [4, 7, 24])
+@pytest.mark.parametrize('days', [4, 7, 12, 24])
 def test_days_of_an_ageing_machine_are_seldom_outliers(tmp_path: Path, days: int) -> None:
     """At most one history in 20 has one by chance: above 4 of 24 once in 170 (seeds fixed)."""
     told = 0
