@@ -35,7 +35,7 @@ _NUMBERS = (
     ('p_unstable', 'P(unstable)', 1.0),
 )
 
-_NAMED = 3  # outliers in the first lines
+_NAMED = 3  # outliers in the first lines, the last ones
 
 
 def page(found: HistoryData, folder: Path) -> Page:
@@ -78,9 +78,9 @@ def lead(found: HistoryData) -> str:
     else:
         told += 'Nothing points to a repair or a sudden fault. '
     if found.outliers:
-        some = '; '.join(f'{o.group}: {o.reason}' for o in found.outliers[:_NAMED])
+        some = '; '.join(f'{o.group}: {o.reason}' for o in found.outliers[-_NAMED:])
         more = len(found.outliers) - _NAMED
-        told += f'Out of line: {some}{f"; and {more} more" if more > 0 else ""}. '
+        told += f'Out of line: {some}{f"; and {more} earlier" if more > 0 else ""}. '
     now = [e.name for e in found.effects if e.there]
     told += f'Now there: {", ".join(now)}.' if now else 'No effect beyond the model is there now.'
     gone = [

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +148,8 @@ def test_a_test_far_off_is_an_outlier(tmp_path: Path) -> None:
     first = lead(far)
     assert 'Out of line: north/2025-03-02: verdict' in first and far.outliers[1].reason in first
     assert 'Nothing points to' not in first
+    several = lead(replace(far, outliers=(far.outliers[0], *far.outliers[1:] * 3)))
+    assert far.outliers[0].group not in several and '; and 1 earlier.' in several
     assert far.series.left_out.keys() == {'north/2025-03-02'}
 
 
