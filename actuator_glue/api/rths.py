@@ -95,7 +95,7 @@ def rths(
             'force' of the specimen [N].
         seed: of the specimen's draws, where the partition gives it standard deviations, and of
             the sensors' noise; None for a fresh one, which the result says.
-        changes: how far it is.
+        changes: `progress` by name, see `Showing`.
 
     Raises:
         InputError: a partition, posterior or option that cannot be used.

@@ -7,6 +7,8 @@ limit, or the posterior must not be used as it stands. 2: the input cannot be us
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from actuator_glue.arguments import Input, Output, number
@@ -129,13 +131,16 @@ def run(args: argparse.Namespace) -> int:
             )
         found = compared.found[compared.best]
     else:
-        with progress('virtual test', 1.0) as done:
+        bar: AbstractContextManager[Callable[[float], object] | bool] = nullcontext(False)
+        if motion is not None:
+            bar = progress('virtual test', 1.0)
+        with bar as shown:
             found = rths(
                 args.partition,
                 calibration,
                 compensator=args.compensator,
                 ground_motion=motion,
-                progress=False if motion is None else done,
+                progress=shown,
                 **options,
             )
     go = not found.problems if args.limit is None else found.go(args.limit)

@@ -4,6 +4,7 @@ import json
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -286,6 +287,8 @@ def test_a_virtual_test_shows_how_far_it_is(
     path = str(posterior().save(tmp_path / 'posterior.npz'))
     main(['rths', 'sdof', '--posterior', path, '--draws', '70', '--ground-motion', 'artificial'])
     assert shown == shares
+    monkeypatch.setattr(command, 'progress', Mock(side_effect=AssertionError))
+    assert main(['rths', 'sdof', '--posterior', path, '--draws', '70']) == 0  # nothing to show
 
 
 def test_comparing_compensators_shows_how_far_it_is(
