@@ -38,8 +38,8 @@ CARRIED = Proposal(
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a bag of 6 s with 60 um of play, and what an estimator said of it."""
-    command = noise(RATE, 6.0, 0.2, 8.0, seed=3)
+    """Return a bag of 8 s with 60 um of play, and what an estimator said of it."""
+    command = noise(RATE, 8.0, 0.2, 8.0, seed=3)
     record = Record(command, command, 1.0 / RATE, 250e3, start_ns=10**18)
     clean = Structure(('backlash',)).simulate(np.array([134.0, 1.1e9, 2.5e5, 0.5, PLAY]), record)
     measured = clean + 1e-5 * np.random.default_rng(3).standard_normal(len(clean))
