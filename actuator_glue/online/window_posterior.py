@@ -172,6 +172,8 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     settle = round(job.settings.settle / record.period)
     white = white_noise(record.measured)
     moved = _check_excited(record, settle, white)
+    # A copied or dead channel, or millimetres for metres, is fitted as well as any: as in files.
+    record.check_channels()
     near = None
     if job.archive is not None:
         near = np.sort(job.archive, axis=0)[len(job.archive) // 2]

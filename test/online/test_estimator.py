@@ -205,6 +205,25 @@ def test_dead_channels_give_no_posterior_and_no_crash(values):
     assert [e for e in told if isinstance(e, Failed)]
 
 
+@pytest.mark.parametrize(
+    ('changed', 'told'),
+    [
+        (lambda r: (r.command, r.command), 'the same, sample for sample'),
+        (lambda r: (r.command, np.full(len(r), 3e-3)), 'measured displacement is constant'),
+        (lambda r: (1e3 * r.command, 1e3 * r.measured), 'check the units'),
+        (lambda r: (r.command, 1e3 * r.measured), 'check the units'),
+    ],
+)
+def test_channels_that_files_may_not_have_give_no_posterior(changed, told):
+    plain = record(4.0, sd=1e-7)
+    command, measured = changed(plain)
+    wrong = replace(plain, command=command, measured=measured)
+    found = list(replay(stream(wrong), SETTINGS))
+    assert not [r for r in found if is_result(r)]
+    failed = [e for e in found if isinstance(e, Failed)]
+    assert failed and all(told in e.message for e in failed)
+
+
 def test_what_one_record_cannot_identify_is_flagged():
     free = results(stream(record(4.0, stiffness=0.0)))[-1]
     names = dict(zip(free.model.names, free.prior_dominated, strict=True))
