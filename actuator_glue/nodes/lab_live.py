@@ -15,7 +15,7 @@ from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.streamer import Streamer
-from actuator_glue.records import check_motion
+from actuator_glue.records import MAX_DISPLACEMENT, check_motion
 from actuator_glue.streams.address import Allowed
 from actuator_glue.streams.layout import PLAIN
 from actuator_glue.streams.layout_file import read_layout
@@ -23,6 +23,7 @@ from actuator_glue.streams.reception import Reception, Samples
 from actuator_glue.streams.seal import read_key
 from actuator_glue.streams.transports import Terms, source
 
+_CHECK = 'check byte_order, type and unit of each value in the layout'
 # What a count says, for people; each is shown on /diagnostics the moment it grows.
 FAULTS = {
     'lost': 'samples were lost and are a gap',
@@ -41,9 +42,14 @@ FAULTS = {
     'second sender': 'messages came from a second sender while the first still sends',
     'overruns': 'samples were dropped because this node was too slow',
     'not finite': 'samples hold NaN or infinity',
+    'out of range': f'samples hold a displacement beyond {MAX_DISPLACEMENT:g} m: {_CHECK}',
     'socket errors': 'errors of the socket',
     'site unreachable': "times the site behind the shadow didn't answer",
 }
+# Numbers below this are none of a test; they come of bytes in another order or of another type.
+# A simulated actuator at rest comes to them in the end, but never begins with them [m].
+_LEAST = 1e-30
+_JUDGED = 3.0  # seconds of samples that are not zero
 # Silence of this length is reported [s].
 SILENT = 1.0
 # Longest pause between two looks at the socket [s].
@@ -97,6 +103,8 @@ class LiveSource:
         self._listener = transport.listen(self._address, terms)
         self._told: Counter[str] = Counter()
         self._finite: Counter[str] = Counter()
+        self._heard = self._nonzero = 0
+        self._largest = 0.0
 
     def described(self) -> list[str]:
         """Return what is listened to."""
@@ -110,6 +118,7 @@ class LiveSource:
     def steps(self) -> Iterator[Step]:
         """Yield what has arrived, for ever."""
         self._reception = self._fresh()
+        self._nonzero, self._largest = 0, 0.0
         self._announce()
         # Before it is said that the stream begins: a program that waits for that sends at once.
         self._node.introduce(self._drain)
@@ -120,14 +129,25 @@ class LiveSource:
             found = [s for rows in batches for s in self._reception.push(rows, now)]
             found += self._reception.waited(now, self._node.get_clock().now().nanoseconds)
             if found:
-                last = now
+                last, self._heard = now, self._listener.counts.total()
             elif now - last > SILENT:
                 last = now  # to be told once a second
-                self._node.complain('silence', f'nothing arrives from {self._address}')
+                self._tell_silence()
             self._tell()
             yield Step(0.0, partial(self._publish, found))
             if batches:
                 time.sleep(self._pause)
+
+    def _tell_silence(self) -> None:
+        """Tell that no sample comes; whether that is for want of messages is no guess."""
+        before, self._heard = self._heard, self._listener.counts.total()
+        if self._heard == before:
+            self._node.complain('silence', f'nothing arrives from {self._address}')
+        else:
+            self._node.complain(
+                'no sample',
+                f'messages arrive from {self._address}, and all are left out; {_CHECK}',
+            )
 
     def _drain(self) -> None:
         """Let go of samples that came while nobody was ready: they belong to the time before."""
@@ -141,6 +161,10 @@ class LiveSource:
         if fault:
             self._node.complain(
                 'sample rate', f'{fault}; give the true one as rate or in the layout', ERROR
+            )
+        if self._nonzero > _JUDGED / self._period and self._largest < _LEAST:
+            self._node.complain(
+                'out of range', f'no displacement reaches {_LEAST:g} m: {_CHECK}', ERROR
             )
         return {
             'source': str(self._address),
@@ -174,13 +198,19 @@ class LiveSource:
             self._node.samples.add(len(samples.command))
             bad = ~(np.isfinite(samples.command) & np.isfinite(samples.measured))
             self._finite['not finite'] += int(bad.sum())
+            most = np.fmax(np.abs(samples.command), np.abs(samples.measured))
+            self._finite['out of range'] += int(((most > MAX_DISPLACEMENT) & ~bad).sum())
+            self._nonzero += int((most > 0.0).sum())
+            self._largest = max(self._largest, float(np.fmax(most, 0.0).max()))
 
     def _tell(self) -> None:
         """Show what has gone wrong since the last look; counts are read by another thread."""
         counts = self._listener.counts + self._reception.counts + self._finite
         for name, meaning in FAULTS.items():
             if counts[name] > self._told[name]:
-                self._node.complain(name, f'{counts[name] - self._told[name]} {meaning}')
+                hint = self._listener.hint if name == 'malformed' else ''
+                what = f'{counts[name] - self._told[name]} {meaning}'
+                self._node.complain(name, f'{what} ({hint})' if hint else what)
         self._told = counts
         if self._reception.rate_fault:
             self._node.complain('sample rate', self._reception.rate_fault)

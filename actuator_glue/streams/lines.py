@@ -48,6 +48,9 @@ class Lines:
     Args:
         layout: what a line holds.
 
+    Attributes:
+        odd: what the last line that cannot be read is, and what was expected; empty without one.
+
     Raises:
         InputError: the layout is one of packets.
     """
@@ -59,6 +62,7 @@ class Lines:
                 'samples, or receive datagrams (udp://)'
             )
         self._layout = layout
+        self.odd = ''
         self.begin()
 
     def begin(self) -> None:
@@ -88,8 +92,9 @@ class Lines:
                 names = [entry.strip(' "') for entry in entries]
                 try:
                     self._places, self._width = places(self._layout, names), len(names)
-                except LookupError:
+                except LookupError as error:
                     bad += 1
+                    self._tell(line, f'column {error} is not in it')
                 continue
             try:
                 if len(entries) != (self._width or len(entries)):
@@ -97,12 +102,19 @@ class Lines:
                 row = [_number(entries[at], name) for name, at in self._places.items()]
             except (ValueError, IndexError):
                 bad += 1
+                wanted = self._width or max(self._places.values()) + 1
+                self._tell(
+                    line, f'{wanted} numbers are expected, {len(entries)} entries are there'
+                )
                 continue
             self._width = len(entries)
             rows.append(row)
         table = np.array(rows, dtype=np.float64).reshape(len(rows), len(self._layout.fields))
         fields = self._places or self._layout.fields
         return dict(zip(fields, table.T, strict=False)), bad
+
+    def _tell(self, line: bytes, why: str) -> None:
+        self.odd = f'the last one is {line[:60].decode("utf-8", "replace")!r}: {why}'
 
     def _entries(self, line: bytes) -> list[str]:
         """Return the entries of a line; an empty one behind the last delimiter is none."""

@@ -5,12 +5,14 @@ import struct
 import subprocess
 import sys
 import time
+from collections import defaultdict
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 from actuator_glue_msgs.msg import PredictionBand
 from ros_nodes import QUICK, RATE, recorded
 
@@ -177,6 +179,74 @@ def test_what_is_sent_as_soon_as_the_stream_begins_is_in_it():
             source.close()
     assert [i for m in found for i in range(m.index, m.index + len(m.command))] == [0, 1, 2]
     assert np.concatenate([m.measured for m in found]).tolist() == [7.0, 8.0, 9.0]
+
+
+def told(tmp_path, layout, messages):
+    """What LiveSource complains of, by kind, while it hears these datagrams of a layout."""
+    port, said = free_port(), defaultdict(str)
+    path = tmp_path / 'layout.yaml'
+    path.write_text(yaml.safe_dump(layout))
+    clock = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=time.time_ns()))
+    values = dict.fromkeys(('file', 'key_file', 'actuator'), '')
+    values |= {'source': f'udp://127.0.0.1:{port}', 'rate': 0.0, 'specimen_stiffness': 0.0}
+    values |= {'hold': 'file', 'block': 10, 'allow': [], 'layout': str(path)}
+
+    def complain(kind, message, *_):
+        said[kind] += f'{message}\n'
+
+    node = SimpleNamespace(
+        get_clock=lambda: clock, introduce=lambda _: None, samples=Rate(), complain=complain
+    )
+    source = LiveSource(node, values, BlockPublisher(lambda topic: Sink(topic, [])))
+    waiting, end = list(messages), time.monotonic() + 60.0
+    with closing(source), closing(socket.socket(type=socket.SOCK_DGRAM)) as out:
+        out.connect(('127.0.0.1', port))
+        for step in source.steps():
+            step.act()
+            for message in waiting[:5]:
+                out.send(message)
+            del waiting[:5]
+            # Silence is told once a second: all has been heard by then.
+            if {'silence', 'no sample'} & said.keys() or time.monotonic() > end:
+                break
+        source.report()
+    return said
+
+
+PAIR = [{'name': 'command', 'unit': 'mm'}, {'name': 'measured', 'unit': 'mm'}]
+COUNTED = [{'name': 'counter', 'type': 'uint32'}, *PAIR]
+MOTION = 5.0 * np.sin(0.1 * np.arange(1, 801))
+
+
+@pytest.mark.parametrize('value', [float, np.float32])
+def test_bytes_in_another_order_are_told_where_neither_counter_nor_time_shows_them(
+    value, tmp_path
+):
+    """Swapped doubles are of any size; those that were float32 once, of none at all."""
+    swapped = [struct.pack('>dd', value(x), value(0.9 * x)) for x in MOTION]
+    said = told(tmp_path, {'rate': 200, 'sample': PAIR}, swapped)
+    assert 'check byte_order' in said['out of range']
+
+
+@pytest.mark.parametrize('quiet', [0.0, 1e-40])
+def test_what_rests_is_not_taken_for_bytes_in_another_order(quiet, tmp_path):
+    """A simulated actuator that has come to rest is at numbers near zero."""
+    motion = np.concatenate([MOTION[:20], np.full(800, quiet)])
+    good = [struct.pack('<Idd', i, 0.0, x) for i, x in enumerate(motion)]
+    said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, good)
+    assert not said['out of range'] and not said['no sample'] and not said['malformed']
+
+
+def test_messages_of_which_none_can_be_used_are_no_silence(tmp_path):
+    swapped = [struct.pack('>Idd', i, x, x) for i, x in enumerate(MOTION, 1)]
+    said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, swapped)
+    assert 'check byte_order' in said['no sample'] and 'far off' in said['implausible']
+
+
+def test_a_message_of_another_size_is_told_with_both_sizes(tmp_path):
+    twice = [2 * struct.pack('<Idd', i, x, x) for i, x in enumerate(MOTION[:20])]
+    said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, twice)
+    assert 'has 40 bytes, the layout has 20' in said['malformed']
 
 
 class Sink:

@@ -21,6 +21,8 @@ from actuator_glue.streams.seal import Seal
 
 # Messages taken at once at most: what holds up the receiver must not fill memory.
 AT_ONCE = 4096
+# Hint at messages whose values are of no use, though they are as many as the layout says.
+NO_NUMBER = 'counter or time of the last one is no number'
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +49,11 @@ class Listener(Protocol):
 
     Attributes:
         counts: what was received and refused, by name.
+        hint: how the last message that is malformed differs from the layout; may be empty.
     """
 
     counts: Counter[str]
+    hint: str
 
     def receive(self, timeout: float) -> list[Rows]:
         """Return what has arrived, waiting for it no longer than so many seconds."""

@@ -15,7 +15,7 @@ from actuator_glue.records import Array
 from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
 from actuator_glue.streams.lines import places
-from actuator_glue.streams.transports import AT_ONCE, Terms, Transport, no_seal
+from actuator_glue.streams.transports import AT_ONCE, NO_NUMBER, Terms, Transport, no_seal
 
 # How long `send` waits for somebody to listen [s]: discovery takes a second or two.
 PATIENCE = 30.0
@@ -52,6 +52,7 @@ class LslListener:
         self._lsl = library(terms.allowed.entries)
         self._name, self._terms = address.name, terms
         self.counts: Counter[str] = Counter()
+        self.hint = 'another number or other names of channels'
         self._inlet: Any = None
         self._places: dict[str, int] = {}
         self._kind: type[np.floating[Any]] = np.float64
@@ -75,6 +76,8 @@ class LslListener:
         terms = self._terms
         rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate)
         self.counts.update(left_out)
+        if left_out['malformed']:
+            self.hint = NO_NUMBER
         if rows.time is None and not left_out.total():
             rows = rows._replace(time=np.asarray(stamps, dtype=np.float64))
         return [rows] if len(rows.command) else []

@@ -139,6 +139,7 @@ class Shadow:
         self._site_at = Address('tcp', *host_port(layout.forward, layout.forward))
         self._terms, self._layout = terms, usual(layout)
         # All names from the start: they are read while the thread counts.
+        self.hint = ''
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTED, 0))
         self._found: deque[Rows] = deque(maxlen=AT_ONCE)
         self._came = threading.Event()

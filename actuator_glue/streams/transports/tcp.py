@@ -14,7 +14,7 @@ from actuator_glue.streams import sockets
 from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
 from actuator_glue.streams.lines import LONGEST, Lines
-from actuator_glue.streams.transports import Terms, Transport
+from actuator_glue.streams.transports import NO_NUMBER, Terms, Transport
 
 # Read at once at most [bytes]; what is not read holds up the sender, not our memory.
 CHUNK = 1 << 16
@@ -28,6 +28,7 @@ class TcpListener:
     def __init__(self, address: Address, terms: Terms) -> None:
         terms.allowed.check(address)
         self.counts: Counter[str] = Counter()
+        self.hint = ''
         self._terms = terms
         self._lines = Lines(terms.layout)
         self._server = sockets.bound(address, socket.SOCK_STREAM)
@@ -78,12 +79,15 @@ class TcpListener:
             return []
         values, bad = self._lines.decoded(lines)
         self.counts['malformed'] += bad
+        self.hint = self._lines.odd or self.hint
         if 'command' not in values or not len(values['command']):
             return []
         self.counts['messages'] += len(values['command'])
         terms = self._terms
         rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate, self._fresh)
         self.counts.update(left_out)
+        if left_out['malformed']:
+            self.hint = NO_NUMBER
         self._fresh = False
         return [rows]
 

@@ -15,10 +15,11 @@ from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
 from actuator_glue.streams.packed import Packed
 from actuator_glue.streams.seal import SIZE
-from actuator_glue.streams.transports import AT_ONCE, Terms, Transport
+from actuator_glue.streams.transports import AT_ONCE, NO_NUMBER, Terms, Transport
 
 # One sender at a time: another is listened to when the first has been silent so long [s].
 SILENT = 1.0
+_LONGEST = 1 << 16  # bytes of a datagram
 
 
 class UdpListener:
@@ -32,6 +33,7 @@ class UdpListener:
         self._size = self._packed.size + (SIZE if terms.seal else 0)
         self._socket = sockets.bound(address, socket.SOCK_DGRAM)
         self._sender: object = None
+        self.hint = ''
         self._heard = 0.0
 
     def receive(self, timeout: float) -> list[Rows]:
@@ -41,8 +43,8 @@ class UdpListener:
         now = time.monotonic()
         for _ in range(AT_ONCE):
             try:
-                # One byte more than fits, so that a longer datagram is noticed.
-                message, sender = self._socket.recvfrom(self._size + 1)
+                # As long as it is, so that one of another size can be told.
+                message, sender = self._socket.recvfrom(_LONGEST)
             except BlockingIOError:
                 break
             except OSError:
@@ -58,6 +60,8 @@ class UdpListener:
         terms = self._terms
         rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate)
         self.counts.update(left_out)
+        if left_out['malformed']:
+            self.hint = NO_NUMBER
         return [rows] if len(rows.command) else []
 
     def _payload(self, message: bytes, sender: tuple[object, ...], now: float) -> bytes | None:
@@ -67,6 +71,7 @@ class UdpListener:
             return None
         if len(message) != self._size:
             self.counts['malformed'] += 1
+            self.hint = f'the last one has {len(message)} bytes, the layout has {self._size}'
             return None
         payload: bytes | None = message
         if self._terms.seal is not None:
