@@ -239,6 +239,17 @@ def test_each_window_tells_how_the_actuator_followed(run, estimated: Callable[..
     assert 'J2, rms error [%]' in str(table)
 
 
+def test_the_only_set_up_is_that_of_the_only_samples(run, tmp_path: Path, estimated) -> None:
+    """A recording of renamed topics: its records have that stiffness, and so has its replay."""
+    bag = tmp_path / 'renamed'
+    names = {'/samples': '/rig/data', '/test_setup': '/other/setup'}
+    with BagWriter(bag) as writer:
+        for found in bag_messages(estimated('bag'), topics=names):
+            writer.add_topic(names[found.topic], found.type)
+            writer.write_raw(names[found.topic], found.data, found.log_time)
+    assert run('replay', bag, '--window', 4, '--evaluations', 4000).code == 0
+
+
 def test_what_cannot_be_replayed(run, tmp_path: Path, estimated: Callable[..., Path]) -> None:
     """Two actuators without a choice, absurd settings, a record shorter than a window."""
     (record,) = read_records(estimated('bag'))
