@@ -42,11 +42,16 @@ class BagWriter:
     Log times are made strictly increasing (by 1 ns steps where they are not), because the order
     of equal stamps is not defined when a bag is played; header stamps stay as they are.
 
+    A file that somebody deletes while it is written is brought back.
+
     Args:
         path: folder of the bag; must not exist.
         flush_period: longest time a message stays in the process [s].
         max_file_bytes: size at which the next file is begun.
         custom: text kept in metadata.yaml under `custom_data`.
+
+    Attributes:
+        brought_back: files that were deleted while they were written.
 
     Raises:
         InputError: the bag exists.
@@ -73,6 +78,7 @@ class BagWriter:
         self._waiting: deque[Message] = deque()
         self._cut: list[Path] = []  # files that could not be finished
         self._begun = 0
+        self.brought_back = 0
         try:
             self.path.mkdir(parents=True)
         except FileExistsError as error:
@@ -211,9 +217,15 @@ class BagWriter:
             try:
                 file.flush()
                 self._flushed = time.monotonic()
-                if file.size >= self._max_file_bytes or file.flushes >= MAX_FILE_FLUSHES:
+                removed = file.removed
+                if (
+                    removed
+                    or file.size >= self._max_file_bytes
+                    or file.flushes >= MAX_FILE_FLUSHES
+                ):
                     file.finish(self.metadata.serialized())
                     self._file = None  # the next message begins another
+                    self.brought_back += removed
             except DiskError:
                 self._put_aside()
                 raise
@@ -247,16 +259,20 @@ class BagWriter:
                 failure = self._put_aside()
                 if not self._waiting:
                     break
-            self._closed = True
+            self._closed, gone = True, ''
             if self._waiting:
                 failure += f'; {self.waiting} messages were not written'
             try:
                 for file in self._cut:
                     recover.mend(file, self.path)
+                gone = self._without_deleted()
                 self._write_metadata()
+                if gone:
+                    raise InputError(gone)
             except InputError as error:
                 failure = failure or str(error)
-                failure += f'; `actuator-glue recover {self.path}` finishes the bag'
+                if not gone:
+                    failure += f'; `actuator-glue recover {self.path}` finishes the bag'
             else:
                 failure = failure if self._waiting else ''
             if failure:
@@ -310,6 +326,17 @@ class BagWriter:
             with suppress(OSError):
                 file.path.unlink()
         return failure
+
+    def _without_deleted(self) -> str:
+        """Leave finished files that were deleted out of the bag; return what to tell of them."""
+        there = [part for part in self.metadata.parts if (self.path / part.name).exists()]
+        gone = [part for part in self.metadata.parts if part not in there]
+        self.metadata.parts = there
+        if not gone:
+            return ''
+        lost = sum(part.count for part in gone)
+        names = ', '.join(part.name for part in gone)
+        return f'{self.path}: {names} with {lost} messages was deleted or moved while recording'
 
     def _write_metadata(self) -> None:
         try:

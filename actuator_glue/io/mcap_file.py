@@ -6,6 +6,7 @@ import errno
 import fcntl
 import io
 import os
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -226,9 +227,27 @@ class McapFile:
             self._stream.flush()
             assert self._raw is not None
             self._raw.truncate()  # gives back the room that was reserved beyond
+            if self.removed:
+                self._bring_back()
             os.fsync(self._raw.fileno())
             self._stream.close()
         self._sure()
+
+    @property
+    def removed(self) -> bool:
+        """Whether somebody has deleted the file, which is written all the same."""
+        raw = self._raw
+        return raw is not None and not raw.closed and not os.fstat(raw.fileno()).st_nlink
+
+    def _bring_back(self) -> None:
+        """Write a deleted file anew: its contents are there until it is closed."""
+        assert self._raw is not None
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with Path(f'/proc/self/fd/{self._raw.fileno()}').open('rb') as held:
+            with self.path.open('xb') as copy:
+                shutil.copyfileobj(held, copy)
+                copy.flush()
+                os.fsync(copy.fileno())
 
     def _make_room(self, more: int) -> None:
         """Have room for so many bytes and for the end of the file; the file stays as it is.

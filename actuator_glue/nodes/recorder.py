@@ -95,7 +95,7 @@ class RecorderNode(base.SuiteNode):
         self.get_logger().info(f'recording to {self.writer.path}')
         self._queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
         self._early: list[Item] = []
-        self._waiting_bytes = self._lost = 0
+        self._waiting_bytes = self._lost = self._brought_back = 0
         self._lag = self._worst_lag = 0.0
         self._failed = self._unsynced = ''
         self.received = Rate()
@@ -120,17 +120,21 @@ class RecorderNode(base.SuiteNode):
         self._finished.set()
         self._queue.put(None)
         self._thread.join()
+        unfinished = ''
         try:
             writer.close()
         except InputError as error:
-            self.get_logger().error(str(error))
+            unfinished = str(error)
         self._lost += writer.waiting
         found = f'{writer.path}: {writer.count} messages'
         if self._lost:
             # Nobody may take an incomplete bag for a whole one.
             self.exit_code = 1
             self.complain('lost', f'{found}, {self._lost} more are lost', ERROR)
-        else:
+        if unfinished:
+            self.exit_code = 1
+            self.complain('bag', unfinished, ERROR)
+        elif not self._lost:
             self.get_logger().info(f'{found}, finished')
         self._failed = self._unsynced = ''
         self.do_report()
@@ -154,6 +158,10 @@ class RecorderNode(base.SuiteNode):
         if self._failed:
             text = f'{self._failed}; what comes waits in memory until the disk takes it'
             self.complain('bag', text, ERROR)
+        if self.writer.brought_back > self._brought_back:
+            self._brought_back = self.writer.brought_back
+            text = f'a file of {self.writer.path} was deleted while it was recorded'
+            self.complain('deleted', f'{text}; its messages are written anew', ERROR)
         if self._unsynced:
             self.complain('disk', self._unsynced, ERROR)
         if self._early:

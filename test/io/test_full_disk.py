@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.bag_reader import messages, summarise
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.recover import recover
@@ -73,6 +75,39 @@ def on_small_disk(tmp_path: Path, script: str, *, size: str = '3m') -> None:
     if done.returncode == 77 or 'unshare' in done.stderr:
         pytest.skip(f'no mount namespaces here ({done.stderr.strip()})')
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def numbered(writer: BagWriter, numbers: range) -> None:
+    for n in numbers:
+        writer.write_raw('/test_setup', bytes([0, 1, 0, 0]) + n.to_bytes(4, 'little'), n)
+    writer.flush()
+
+
+def test_what_is_deleted_while_it_is_written_is_brought_back(tmp_path: Path) -> None:
+    """Somebody tidies up: until a file is closed its contents are there."""
+    bag = tmp_path / 'bag'
+    with BagWriter(bag) as writer:
+        writer.add_topic('/test_setup', 'TestSetup')
+        numbered(writer, range(100))
+        shutil.rmtree(bag)
+        numbered(writer, range(100, 200))
+        numbered(writer, range(200, 300))
+        assert writer.brought_back == 1
+        (bag / 'bag_1.mcap').unlink()
+    assert [m.log_time for m in messages(bag)] == list(range(300))
+    assert summarise(bag).finished and recover(bag).notes == []
+
+
+def test_a_finished_file_that_is_deleted_is_said(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    writer = BagWriter(bag, max_file_bytes=1)
+    writer.add_topic('/test_setup', 'TestSetup')
+    for n in range(3):
+        numbered(writer, range(n, n + 1))
+    (bag / 'bag_1.mcap').unlink()
+    with pytest.raises(InputError, match=r'bag_1.mcap with 1 messages was deleted'):
+        writer.close()
+    assert [m.log_time for m in messages(bag)] == [0, 2] and writer.count == 2
 
 
 def test_what_a_full_disk_refuses_is_written_when_there_is_room(tmp_path: Path) -> None:

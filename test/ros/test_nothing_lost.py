@@ -2,6 +2,7 @@
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
@@ -188,6 +189,26 @@ def test_a_disk_that_stays_full_leaves_a_finished_bag_and_the_loss_is_told(
     assert len(index) > 5000 and np.array_equal(index, np.arange(len(index)))
     assert probe.index - len(index) <= 100 * lost
     assert recover(bag).notes == []
+
+
+def test_a_bag_that_is_deleted_while_it_is_recorded_is_brought_back_and_told(
+    start, probe, tmp_path
+):
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    probe.open_stream()
+
+    def written(count):
+        return lambda: probe.number('recorder', 'messages written') > count
+
+    probe.until(sending(probe, written(50)), what='recording')
+    shutil.rmtree(bag)
+    told = sending(probe, lambda: 'was deleted' in probe.faults['recorder'])
+    probe.until(told, what='that it was deleted')
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=60.0))
+    assert recorder.end() == 0, recorder.text
+    assert np.array_equal(recorded(bag), np.arange(probe.index))
+    assert summarise(bag).finished and 'finished' in recorder.text
 
 
 @pytest.fixture
