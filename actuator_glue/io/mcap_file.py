@@ -243,11 +243,11 @@ class McapFile:
         """Write a deleted file anew: its contents are there until it is closed."""
         assert self._raw is not None
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with Path(f'/proc/self/fd/{self._raw.fileno()}').open('rb') as held:
-            with self.path.open('xb') as copy:
-                shutil.copyfileobj(held, copy)
-                copy.flush()
-                os.fsync(copy.fileno())
+        contents = Path(f'/proc/self/fd/{self._raw.fileno()}')
+        with contents.open('rb') as held, self.path.open('xb') as copy:
+            shutil.copyfileobj(held, copy)
+            copy.flush()
+            os.fsync(copy.fileno())
 
     def _make_room(self, more: int) -> None:
         """Have room for so many bytes and for the end of the file; the file stays as it is.

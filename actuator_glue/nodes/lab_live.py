@@ -146,7 +146,7 @@ class LiveSource:
         else:
             self._node.complain(
                 'no sample',
-                f'messages arrive from {self._address}, and all are left out; {_CHECK}',
+                f'messages arrive from {self._address}, and all are left out; check the layout',
             )
 
     def _drain(self) -> None:
@@ -157,11 +157,8 @@ class LiveSource:
 
     def report(self) -> dict[str, Any]:
         """Return counts, offset and skew of the sender's clock; tell of a wrong rate."""
-        clock, fault = self._reception.clock, self._reception.rate_fault
-        if fault:
-            self._node.complain(
-                'sample rate', f'{fault}; give the true one as rate or in the layout', ERROR
-            )
+        clock = self._reception.clock
+        self._tell_rate()
         if self._nonzero > _JUDGED / self._period and self._largest < _LEAST:
             self._node.complain(
                 'out of range', f'no displacement reaches {_LEAST:g} m: {_CHECK}', ERROR
@@ -212,5 +209,11 @@ class LiveSource:
                 what = f'{counts[name] - self._told[name]} {meaning}'
                 self._node.complain(name, f'{what} ({hint})' if hint else what)
         self._told = counts
-        if self._reception.rate_fault:
-            self._node.complain('sample rate', self._reception.rate_fault)
+        self._tell_rate()
+
+    def _tell_rate(self) -> None:
+        if fault := self._reception.rate_fault:
+            # Always in the same words: what lasts is logged once.
+            self._node.complain(
+                'sample rate', f'{fault}; give the true one as rate or in the layout', ERROR
+            )

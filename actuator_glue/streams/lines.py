@@ -98,14 +98,11 @@ class Lines:
                 continue
             try:
                 if len(entries) != (self._width or len(entries)):
-                    raise ValueError(f'{len(entries)} entries')
+                    raise ValueError(f'{len(entries)} entries in place of {self._width}')
                 row = [_number(entries[at], name) for name, at in self._places.items()]
-            except (ValueError, IndexError):
+            except (ValueError, IndexError) as error:
                 bad += 1
-                wanted = self._width or max(self._places.values()) + 1
-                self._tell(
-                    line, f'{wanted} numbers are expected, {len(entries)} entries are there'
-                )
+                self._tell(line, str(error))
                 continue
             self._width = len(entries)
             rows.append(row)
@@ -114,7 +111,8 @@ class Lines:
         return dict(zip(fields, table.T, strict=False)), bad
 
     def _tell(self, line: bytes, why: str) -> None:
-        self.odd = f'the last one is {line[:60].decode("utf-8", "replace")!r}: {why}'
+        shown = line[:60].decode('utf-8', 'replace').strip()
+        self.odd = f'the last one is {shown!r}: {why}'
 
     def _entries(self, line: bytes) -> list[str]:
         """Return the entries of a line; an empty one behind the last delimiter is none."""

@@ -240,7 +240,15 @@ def test_what_rests_is_not_taken_for_bytes_in_another_order(quiet, tmp_path):
 def test_messages_of_which_none_can_be_used_are_no_silence(tmp_path):
     swapped = [struct.pack('>Idd', i, x, x) for i, x in enumerate(MOTION, 1)]
     said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, swapped)
-    assert 'check byte_order' in said['no sample'] and 'far off' in said['implausible']
+    assert 'check the layout' in said['no sample'] and 'far off' in said['implausible']
+
+
+def test_a_wrong_rate_is_told_in_the_same_words_each_time(tmp_path):
+    """What lasts is logged once only where its words stay."""
+    timed = [COUNTED[0], {'name': 'time', 'unit': 's'}, *PAIR]
+    slow = [struct.pack('<Iddd', i, i / 100, x, x) for i, x in enumerate(MOTION)]
+    said = told(tmp_path, {'rate': 200, 'sample': timed}, slow)['sample rate'].splitlines()
+    assert said and all('give the true one' in line for line in said)
 
 
 def test_a_message_of_another_size_is_told_with_both_sizes(tmp_path):

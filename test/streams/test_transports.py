@@ -262,7 +262,7 @@ def test_lines_with_another_number_of_entries_are_counted_and_give_no_sample():
     assert index.tolist() == list(range(20))
     assert np.allclose(command, 1.5e-3) and np.allclose(measured, 1.25e-3)
     assert listener.counts['malformed'] == 40
-    assert "b'" not in listener.hint and '3 numbers are expected, 4 entries' in listener.hint
+    assert "b'" not in listener.hint and '4 entries in place of 3' in listener.hint
 
 
 @pytest.mark.parametrize('channels', [1, 3])
