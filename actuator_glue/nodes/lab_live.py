@@ -129,7 +129,7 @@ class LiveSource:
             found = [s for rows in batches for s in self._reception.push(rows, now)]
             found += self._reception.waited(now, self._node.get_clock().now().nanoseconds)
             if found:
-                last, self._heard = now, self._listener.counts.total()
+                last, self._heard = now, self._messages()
             elif now - last > SILENT:
                 last = now  # to be told once a second
                 self._tell_silence()
@@ -138,9 +138,13 @@ class LiveSource:
             if batches:
                 time.sleep(self._pause)
 
+    def _messages(self) -> int:
+        """Return how many have come, whether or not they fit the layout; no connections."""
+        return self._listener.counts['messages'] + self._listener.counts['malformed']
+
     def _tell_silence(self) -> None:
         """Tell that no sample comes; whether that is for want of messages is no guess."""
-        before, self._heard = self._heard, self._listener.counts.total()
+        before, self._heard = self._heard, self._messages()
         if self._heard == before:
             self._node.complain('silence', f'nothing arrives from {self._address}')
         else:

@@ -181,14 +181,15 @@ def test_what_is_sent_as_soon_as_the_stream_begins_is_in_it():
     assert np.concatenate([m.measured for m in found]).tolist() == [7.0, 8.0, 9.0]
 
 
-def told(tmp_path, layout, messages):
-    """What LiveSource complains of, by kind, while it hears these datagrams of a layout."""
-    port, said = free_port(), defaultdict(str)
+def told(tmp_path, layout, messages, scheme='udp'):
+    """What LiveSource complains of, by kind, while it hears these messages of a layout."""
+    kind = socket.SOCK_DGRAM if scheme == 'udp' else socket.SOCK_STREAM
+    port, said = free_port(kind), defaultdict(str)
     path = tmp_path / 'layout.yaml'
     path.write_text(yaml.safe_dump(layout))
     clock = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=time.time_ns()))
     values = dict.fromkeys(('file', 'key_file', 'actuator'), '')
-    values |= {'source': f'udp://127.0.0.1:{port}', 'rate': 0.0, 'specimen_stiffness': 0.0}
+    values |= {'source': f'{scheme}://127.0.0.1:{port}', 'rate': 0.0, 'specimen_stiffness': 0.0}
     values |= {'hold': 'file', 'block': 10, 'allow': [], 'layout': str(path)}
 
     def complain(kind, message, *_):
@@ -199,7 +200,7 @@ def told(tmp_path, layout, messages):
     )
     source = LiveSource(node, values, BlockPublisher(lambda topic: Sink(topic, [])))
     waiting, end = list(messages), time.monotonic() + 60.0
-    with closing(source), closing(socket.socket(type=socket.SOCK_DGRAM)) as out:
+    with closing(source), closing(socket.socket(type=kind)) as out:
         out.connect(('127.0.0.1', port))
         for step in source.steps():
             step.act()
@@ -241,6 +242,11 @@ def test_messages_of_which_none_can_be_used_are_no_silence(tmp_path):
     swapped = [struct.pack('>Idd', i, x, x) for i, x in enumerate(MOTION, 1)]
     said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, swapped)
     assert 'check the layout' in said['no sample'] and 'far off' in said['implausible']
+
+
+def test_a_connection_that_says_nothing_is_silent(tmp_path):
+    said = told(tmp_path, {'rate': 200, 'sample': COUNTED, 'header': True}, [], 'tcp')
+    assert said['silence'] and not said['no sample']
 
 
 def test_a_wrong_rate_is_told_in_the_same_words_each_time(tmp_path):
