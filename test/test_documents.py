@@ -177,13 +177,16 @@ def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     names = {
         'free': ('free', 'raw'),
-        'clamped': ('clamped', 'test', 'tuesday'),
+        'clamped': ('clamped', 'test'),
         'undeclared_earthquake': ('earthquake',),
     }
     for bag, files in names.items():
         record = load(ROOT / 'bags' / bag)
         for file in files:
             write(tmp_path / f'{file}.csv', record)
+    for seed, day in enumerate(('tuesday', 'today')):
+        made = ['simulate', f'{day}.csv', '--stiffness', '250e3', '--duration', '10']
+        assert main([*made, '--seed', str(seed)]) == 0
     write(tmp_path / 'test.mat', load(tmp_path / 'test.csv'))
     for file, columns in (('command', (0, 1)), ('response', (0, 2))):
         rows = [
@@ -212,14 +215,14 @@ def earlier(laboratory: Path) -> None:
     )
     monday = ['free.csv', 'clamped.csv', '--stiffness', '0', '250e3', '--save', 'monday.npz']
     assert main(['calibrate', *monday]) == 0
+    (laboratory / 'priors').mkdir()
+    shutil.copy('monday.npz', 'priors/north.npz')
 
 
 def run(words: list[str]) -> int:
     """Run one of our commands; whatever it would write over is its own."""
-    options = (
-        ['--force'] if words[1] in ('convert', 'map', 'plot', 'simulate', 'calibrate') else []
-    )
-    return main([*words[1:], *options])
+    written = {'calibrate', 'convert', 'diagnose', 'map', 'plot', 'simulate'}
+    return main([*words[1:], *(['--force'] if words[1] in written else [])])
 
 
 SHORT = ('howto_your_data.md', 'howto_record_and_replay.md', 'howto_recover.md', 'recipes.md')
