@@ -153,14 +153,12 @@ def rths(
     notes = _notes(loop, calibration, chosen, by_test)
     if virtual is not None and by_test:
         unstable = virtual.diverged
-        # A draw that grows slowly diverges after the record only; one that had the time is held by
-        # its nonlinear effects. Coefficients that adapt leave the roots of the first ones behind.
-        grown = growth * virtual.duration_s
-        slow = ~responses.diverged & (grown > 0.0) & (grown < _ENOUGH) & (not chosen.adaptive)
+        # Coefficients that adapt leave the roots of the first ones behind.
+        slow = _slow(responses.diverged, growth, virtual.duration_s) & (not chosen.adaptive)
         if slow.any():
             either = stability.share(responses.diverged | slow, effective)
             unstable = replace(unstable, upper=either.upper)
-            notes.insert(0, _slow(slow, growth, curved, virtual.duration_s))
+            notes.insert(0, _slow_note(slow, growth, curved, virtual.duration_s))
     return StabilityResult(
         partition=partition.name,
         natural_frequencies_hz=tuple(map(float, partition.natural_frequencies)),
@@ -215,7 +213,16 @@ def _effective(calibration: Calibration) -> float:
     return float(np.nanmin(sizes)) if np.isfinite(sizes).any() else 1.0
 
 
-def _slow(slow: Flags, growth: Array, curved: Sequence[str], duration: float) -> str:
+def _slow(diverged: Flags, growth: Array, duration: float) -> Flags:
+    """Return which draws are unstable, but grow too slowly to diverge within a record.
+
+    One that had the time for it and did not is held by its nonlinear effects.
+    """
+    grown = growth * duration
+    return ~diverged & (grown > 0.0) & (grown < _ENOUGH)
+
+
+def _slow_note(slow: Flags, growth: Array, curved: Sequence[str], duration: float) -> str:
     """Return what the roots say against draws that did not diverge."""
     return (
         f'{100.0 * slow.mean():.3g} % of the draws do not diverge in {duration:g} s, but are '

@@ -133,27 +133,24 @@ def test_another_unit_than_the_file_gives_is_told(
     assert all(told in line for line in said)
 
 
-def test_a_unit_of_no_length_is_not_proposed(tmp_path: Path) -> None:
-    path = tmp_path / 'a.csv'
-    path.write_text('Weg [V],y [mm]\n' + ''.join(f'{i},{i}\n' for i in range(20)))
+def told_in_mm(folder: Path, command: str, measured: str) -> list[str]:
+    """Return what is told of columns with these names that a channel map has in mm."""
+    path = folder / 'a.csv'
+    path.write_text(f'{command},{measured}\n' + ''.join(f'{i},{i}\n' for i in range(20)))
     content = {
-        'command': {'column': 'Weg [V]', 'unit': 'mm'},
+        'command': {'column': command, 'unit': 'mm'},
         'measured': {'column': 2, 'unit': 'mm'},
         'rate': 100,
     }
     said: list[str] = []
     read(path, channels=parse_channel_map(content, 'map'), warn=said.append)
+    return said
+
+
+def test_a_unit_of_no_length_is_not_proposed(tmp_path: Path) -> None:
+    said = told_in_mm(tmp_path, 'Weg [V]', 'y [mm]')
     assert said[0].endswith('If the file is right, give mm per V as `scale`')
 
 
 def test_letters_behind_a_name_contradict_no_map(tmp_path: Path) -> None:
-    path = tmp_path / 'a.csv'
-    path.write_text('cmd_in,pos_m\n' + ''.join(f'{i},{i}\n' for i in range(20)))
-    content = {
-        'command': {'column': 'cmd_in', 'unit': 'mm'},
-        'measured': {'column': 2, 'unit': 'mm'},
-        'rate': 100,
-    }
-    said: list[str] = []
-    read(path, channels=parse_channel_map(content, 'map'), warn=said.append)
-    assert not said
+    assert not told_in_mm(tmp_path, 'cmd_in', 'pos_m')

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from actuator_glue.diagnosis.refits.candidates import structure_of
 from actuator_glue.diagnosis.refits.screening import Remainder, screen, signatures
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -17,7 +18,6 @@ from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.stretches import Part, stretches
 from actuator_glue.model.effects import Effect, scale
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _SCREENED = 30.0  # s of stretches on which signatures are seen
@@ -52,7 +52,7 @@ class Promises:
     def signature(self, name: str) -> tuple[Array, Array]:
         """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
         if name not in self._signatures:
-            alone, base = self._structure(name), self.base.theta
+            alone, base = structure_of(self.entries, (name,)), self.base.theta
             thetas = alone.starts(base, scale(self.data.records, base))
             seen = signatures(self._seen_on(name).data, alone, thetas, base)
             self._signatures[name] = thetas[:, alone.columns(name)], seen
@@ -114,11 +114,8 @@ class Promises:
         """Sort effects by what their signatures promise, as `left`."""
         return [name for name, _ in self.left(current, names, beside=beside)]
 
-    def _structure(self, *effects: str) -> Structure:
-        return Structure(e for name, e in self.entries.items() if name in effects)
-
     def _screen(self, current: Trial, name: str, beside: bool) -> tuple[float, Array]:
-        model = self._structure(*current.effects, name)
+        model = structure_of(self.entries, (*current.effects, name))
         part, fit = self._seen_on(name), current.fit
         sizes, seen = self.signature(name)
         new = np.zeros(len(model.parameters), dtype=np.bool_)

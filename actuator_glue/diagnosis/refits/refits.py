@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
-from actuator_glue.diagnosis.refits.candidates import FEEDBACK
+from actuator_glue.diagnosis.refits.candidates import FEEDBACK, structure_of
 from actuator_glue.diagnosis.refits.promises import Promises
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
@@ -129,7 +129,7 @@ class Refits:
 
     def structure(self, *effects: str) -> Structure:
         """Return the structure of these effects, in their order."""
-        return Structure(e for name, e in self.entries.items() if name in effects)
+        return structure_of(self.entries, effects)
 
     def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
         """Score an already refitted structure with the current noise."""

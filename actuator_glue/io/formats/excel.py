@@ -49,7 +49,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                 columns = _columns(head, first, timed)
                 found.append((sheet, first, [i in timed for i in range(len(columns))], columns))
             whole = [one for one in found if _holds(one[3], channels)]
-            for sheet, skip, times, columns in (whole or found)[:1]:
+            if found:
+                sheet, skip, times, columns = (whole or found)[0]
                 rows = sheet.iter_rows(min_row=skip + 1, values_only=True)
                 table = _numbers(rows, times, skip, path)
                 return FileTable(
