@@ -43,6 +43,16 @@ def test_defaults_are_those_of_the_options(name: str) -> None:
     assert list(changes.__annotations__) == names
 
 
+@pytest.mark.parametrize('name', ['calibrate', 'combinations', 'diagnose'])
+def test_a_second_record_is_no_options(name: str) -> None:
+    """Two records side by side, without the brackets of a list, are told what to do."""
+    record = ag.simulate(ag.Command(duration=2.0, rate=100.0, high=5.0))
+    others = (record, record) if name == 'diagnose' else (record,)
+    function: Any = getattr(ag, name)
+    with pytest.raises(ag.InputError, match=r'into one list, as in \w+\(\[free, clamped\]\)'):
+        function(record, *others)
+
+
 def test_a_notebook_completes_them() -> None:
     """What IPython asks: jedi, of the objects that are there."""
     jedi = pytest.importorskip('jedi', reason='no jedi, which comes with IPython')

@@ -73,7 +73,7 @@ def calibrate(
         >>> posterior = calibrate([free, clamped], seed=3)  # doctest: +SKIP
         >>> posterior.parameters['beta_1'].mean  # doctest: +SKIP
     """
-    options = chosen(CalibrationOptions() if options is None else options, changes, 'calibrate')
+    options = chosen(CalibrationOptions, options, changes, 'calibrate')
     tests = records_given(records, stiffness)
     model = sampled_model(options)
     cleaned, notes = clean(tests)

@@ -167,7 +167,7 @@ def combinations(
     Example:
         >>> found = combinations('clamped.csv')  # doctest: +SKIP
     """
-    options = chosen(CalibrationOptions() if options is None else options, changes, 'combinations')
+    options = chosen(CalibrationOptions, options, changes, 'combinations')
     if options.prior is not None or options.use_force:
         raise InputError(
             'an earlier calibration and the force as evidence need the specimen stiffness; give '

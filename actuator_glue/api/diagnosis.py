@@ -373,7 +373,7 @@ def diagnose(
         InputError: stiffness not known, records too short, channels that cannot belong together,
             or an option that cannot be used.
     """
-    options = chosen(DiagnosisOptions() if options is None else options, changes, 'diagnose')
+    options = chosen(DiagnosisOptions, options, changes, 'diagnose')
     started = time.perf_counter()
     given = records_given(records, stiffness)
     held = [] if holdout is None else records_given(holdout, name='holdout')

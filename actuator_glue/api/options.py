@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass, replace
+from dataclasses import MISSING, Field, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_glue.errors import InputError
@@ -18,14 +18,28 @@ Options = TypeVar('Options', bound='DataclassInstance')
 Function = TypeVar('Function', bound=Callable[..., Any])
 
 
-def chosen(options: Options, changes: Mapping[str, Any], function: str) -> Options:
-    """Return options with some of them replaced; `function` is whose they are, for messages.
+def chosen(
+    kind: type[Options], options: Options | None, changes: Mapping[str, Any], function: str
+) -> Options:
+    """Return options with some of them replaced.
+
+    Args:
+        kind: a dataclass, whose fields are the options.
+        options: what was given as one object; None for the defaults.
+        changes: what was given by name.
+        function: whose options they are, for messages.
 
     Raises:
-        InputError: no such option, or a value that cannot be used.
+        InputError: options of another kind, no such option, or a value that cannot be used.
     """
-    if not is_dataclass(options):
-        of_kind(options, 'options', (), f'the options of {function} as an object, or each by name')
+    options = kind() if options is None else options
+    of_kind(
+        options,
+        'options',
+        kind,
+        f'{kind.__name__}, or each option by name; several records go into one list, as in '
+        f'{function}([free, clamped])',
+    )
     known = [f.name for f in fields(options)]
     unknown = sorted(set(changes) - set(known))
     if unknown:

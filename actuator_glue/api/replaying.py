@@ -169,7 +169,7 @@ def replay(
     Raises:
         InputError: unusable bag, record or setting, or not one window could be estimated.
     """
-    asked = chosen(ReplayOptions(), changes, 'replay').asked()
+    asked = chosen(ReplayOptions, None, changes, 'replay').asked()
     under_way = _open(source, namespace, compare_live=not asked)
     under_way.tracking = tracking
     started = time.perf_counter()

@@ -104,7 +104,7 @@ def rths(
         >>> found = rths('benchmark_case_1', posterior)  # doctest: +SKIP
         >>> found.p_unstable.upper  # doctest: +SKIP
     """
-    asked = options.chosen(Showing(), changes, 'rths')
+    asked = options.chosen(Showing, None, changes, 'rths')
     seed, draws = seed_given(seed), whole(draws, 'draws')
     calibration = calibration_given(calibration)
     frequencies = [number(f, 'frequencies') for f in np.ravel(np.asarray(frequencies, object))]

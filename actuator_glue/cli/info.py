@@ -6,7 +6,7 @@ import argparse
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._output import add_json, note, say, table
 from actuator_glue.cli._records import add_records, resampling
@@ -15,6 +15,9 @@ from actuator_glue.io.json_file import write_json
 from actuator_glue.io.units import factor
 from actuator_glue.motion import METRES, speaking
 from actuator_glue.records import Record
+
+if TYPE_CHECKING:
+    from actuator_glue.io.load import Stiffness
 
 EXAMPLES = (
     'info test.csv',
@@ -44,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from actuator_glue.io.load import load_records
 
     code, files = 0, []
-    for path in args.records:
+    # Each path is read by itself, so that one that is damaged hides none of the others.
+    for path, stiffness in zip(args.records, _stiffnesses(args), strict=True):
         content: dict[str, Any] = {'path': str(path), 'damage': [], 'warnings': []}
         if is_bag(path):
             content |= _bag(path, args)
@@ -52,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             records = load_records(
                 path,
-                stiffness=args.stiffness,
+                stiffness=stiffness,
                 channels=args.channels,
                 hold=args.hold,
                 resample=resampling(args),
@@ -74,6 +78,14 @@ def run(args: argparse.Namespace) -> int:
         files.append(content)
     write_json({'schema': 'actuator_glue.info/1', 'files': files}, args.json)
     return code
+
+
+def _stiffnesses(args: argparse.Namespace) -> list[list[Stiffness] | None]:
+    """Return what --stiffness says of each path: one value of its own, or all of them."""
+    given = args.stiffness
+    if given is not None and len(given) == len(args.records):
+        return [[k] for k in given]
+    return [given] * len(args.records)
 
 
 def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:

@@ -51,6 +51,20 @@ def test_several_records_are_one_bag_or_numbered_files(
     assert sorted(p.name for p in tmp_path.glob('*.csv')) == ['x_1.csv', 'x_2.csv']
 
 
+def test_info_takes_a_stiffness_for_each_file(run, tmp_path: Path, problem_r: Path) -> None:
+    """As the commands behind it do: one for each file, one for all, one for each of a bag."""
+    one, two = problem_r / 'r_1.csv', problem_r / 'r_2.csv'
+
+    def told(*arguments: object) -> list[float]:
+        files = run('info', *arguments, '--json', '-').json['files']
+        return [r['stiffness_n_per_m'] for file in files for r in file['records']]
+
+    assert told(one, two, '--stiffness', 1e3, 2e3) == [1e3, 2e3]
+    assert told(one, two, '--stiffness', 1e3) == [1e3, 1e3]
+    assert run('convert', one, two, tmp_path / 'bag').code == 0
+    assert told(tmp_path / 'bag', '--stiffness', 1e3, 2e3) == [1e3, 2e3]
+
+
 def test_a_cut_bag_is_told_mended_and_used(run, tmp_path: Path, short_bag: Path) -> None:
     """Info and calibrate say what to do, recover does it, and then they work."""
     bag = tmp_path / 'bag'
