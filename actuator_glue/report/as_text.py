@@ -11,7 +11,7 @@ WIDTH = 100  # letters of a line
 LINES = 22  # at most, whatever a result holds
 
 
-def plain(blocks: Sequence[Block], rest: str) -> str:
+def as_text(blocks: Sequence[Block], rest: str) -> str:
     """Return blocks as text, cut off after some lines.
 
     Args:
