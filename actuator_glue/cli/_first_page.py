@@ -64,7 +64,7 @@ def _given(verb: str, args: argparse.Namespace) -> Iterator[tuple[str, list[list
     importlib.import_module(f'actuator_glue.cli.{verb}').add_arguments(of_verb)
     for action in of_verb._actions:
         value = getattr(args, action.dest, action.default)
-        if not action.option_strings or action.type is Output or action.dest in _SAID:
+        if not action.option_strings or isinstance(value, Output) or action.dest in _SAID:
             continue
         if value == action.default or action.dest in ('force', 'help'):
             continue

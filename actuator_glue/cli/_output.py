@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from actuator_glue.arguments import Output, add_force, make_room
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
+from actuator_glue.report.page_name import check_page_name
 
 _AN_HOUR = 3600.0  # s
 
@@ -28,6 +29,21 @@ def add_json(parser: argparse.ArgumentParser) -> None:
         help="also write the result as JSON; '-' is standard output",
     )
     add_force(parser)
+
+
+def add_report(parser: argparse.ArgumentParser) -> None:
+    """Add `--report OUT.html`; another format is refused before any long work."""
+    parser.add_argument(
+        '--report', type=_page, metavar='OUT.html', help='also write a report, one HTML file'
+    )
+
+
+def _page(text: str) -> Output:
+    try:
+        check_page_name(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return Output(text)
 
 
 def beside(out: str | None, write: Callable[[str], object]) -> int:
@@ -79,13 +95,7 @@ def table(
     from rich.markup import escape
     from rich.table import Table
 
-    shown = Table(
-        title=_told(title) or None,
-        box=box.SIMPLE_HEAD,
-        title_justify='left',
-        pad_edge=False,
-        padding=(0, 1, 0, 0),
-    )
+    shown = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for i, column in enumerate(columns):
         shown.add_column(
             escape(_told(column)), justify='left' if i == 0 else 'right', no_wrap=True
@@ -94,6 +104,8 @@ def table(
         shown.add_row(*(escape(_told(cell)) for cell in row))
     file = sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout
     console = Console(file=file, highlight=False)
+    if title:  # on a line of its own: one of the table would be folded to the table's width
+        console.print(_told(title), style='italic', markup=False, emoji=False, soft_wrap=True)
     # A number that is cut off is worse than a line that the terminal folds.
     needed = console.measure(shown, options=console.options.update(max_width=500)).maximum
     Console(file=file, highlight=False, width=max(console.width, needed)).print(shown)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from actuator_glue.arguments import Output, number, number_or_auto
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
-from actuator_glue.cli._output import add_json, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -112,9 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='save draws, bounds, units and provenance, for `plot --draws` and for others (.npz), '
         'or draws and models for MATLAB (.mat)',
     )
-    parser.add_argument(
-        '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
-    )
+    add_report(parser)
     add_json(parser)
 
 

@@ -17,7 +17,7 @@ from actuator_glue.arguments import Input, Output
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._heap import give_back
-from actuator_glue.cli._output import add_json, beside, note, progress, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, progress, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -48,9 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'stiffness, --stiffness has one more value for it behind those of the records',
     )
     add_effects_file(parser)
-    parser.add_argument(
-        '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
-    )
+    add_report(parser)
     parser.add_argument(
         '--save-effects',
         type=Output,

@@ -18,7 +18,7 @@ from pathlib import Path
 from actuator_glue import cli
 from actuator_glue.arguments import claim_outputs
 from actuator_glue.cli._parser import Parser, examples
-from actuator_glue.cli._streams import StandardStream, standard_streams
+from actuator_glue.cli._standard_streams import StandardStream, standard_streams
 from actuator_glue.errors import InputError
 from actuator_glue.motion import METRES, speak, spoken
 

@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from actuator_glue.arguments import Input, Output, number
-from actuator_glue.cli._output import add_json, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
@@ -89,9 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--save', type=Output, metavar='OUT.npz', help='save the result with all its draws'
     )
-    parser.add_argument(
-        '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
-    )
+    add_report(parser)
     add_json(parser)
 
 

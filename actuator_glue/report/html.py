@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from actuator_glue import __version__
 from actuator_glue.errors import InputError
 from actuator_glue.motion import spoken
+from actuator_glue.report.page_name import check_page_name
 from actuator_glue.report.style import data_uri, narrowed
 
 TEMPLATES = Path(__file__).with_name('templates')
@@ -132,8 +133,9 @@ def write(path: Path, page: Page) -> Path:
     """Write the page to a file and return its path; errors as `render`.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the name says another format, or the file cannot be written.
     """
+    check_page_name(path)
     text = render(page)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from actuator_glue.cli import main as entry
+from actuator_glue.cli._output import table
 from actuator_glue.errors import InputError
 
 EVERY = sorted(entry.commands())
@@ -35,6 +36,13 @@ def test_help_names_every_command_with_one_line(run) -> None:
     for name, file in entry.commands().items():
         assert name in done.out
         assert len(entry.summary(file)) > 20, name
+
+
+def test_the_title_of_a_narrow_table_stays_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """As it is, whatever it holds; so does one as wide as a terminal."""
+    title = 'refitted [x] :smile: ' + 40 * 'long '
+    table(title, ['a', 'b'], [['c', '1']], argparse.Namespace(json=None))
+    assert capsys.readouterr().out.splitlines()[0] == title
 
 
 @pytest.mark.parametrize('command', EVERY)

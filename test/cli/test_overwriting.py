@@ -229,6 +229,14 @@ def test_two_outputs_need_two_names(run, tests: Path) -> None:
     assert 'nope.csv' in done.message
 
 
+@pytest.mark.parametrize('command', ['calibrate', 'diagnose', 'rths'])
+def test_a_report_of_another_format_is_refused_before_any_work(run, command: str) -> None:
+    """It is HTML under any name, which nothing opens as PDF."""
+    done = run(command, 'nope', '--report', 'out/report.pdf')
+    assert done.code == 2
+    assert 'out/report.pdf: a report is one HTML file, no .pdf' in done.err
+
+
 @pytest.mark.parametrize(
     ('line', 'said'),
     [

@@ -125,3 +125,12 @@ def test_a_table_in_a_notebook_keeps_its_columns_apart(tmp_path: Path) -> None:
     path.write_text(f'<!DOCTYPE html><html>{look}{table}{asked}</html>')
     side, room = title_of(path, 1200).split()
     assert side == 'right' and float(room) > 5.0
+
+
+@pytest.mark.parametrize('name', ['page.pdf', 'page.DOCX', 'page.png'])
+def test_a_report_is_not_called_another_format(tmp_path: Path, name: str) -> None:
+    """No program would open it; the command says so before it computes."""
+    with pytest.raises(InputError, match=r'name that ends in \.html'):
+        write(tmp_path / name, Page('a', 'b', ()))
+    for good in ('page.html', 'page.htm', 'page', 'report 2026.11.29'):
+        assert write(tmp_path / good, Page('a', 'b', ())).is_file()
