@@ -79,8 +79,10 @@ def test_what_it_is_told_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[
     told = json.loads((tmp_path / 'a.json').read_text())
     assert told['records'][0]['stiffness_n_per_m'] is None
     kept = Combinations.load(tmp_path / 'a.npz')
+    assert kept.to_json()['combinations'] == told['combinations']
+    table = kept.to_dataframe()
     for name, p in kept.combinations.items():
-        assert p.mean == told['combinations'][name]['mean']
+        assert p.mean == told['combinations'][name]['mean'] == table['mean'][name]
     page = (tmp_path / 'a.html').read_text()
     assert 'no hybrid test' in page
     assert not kept.records and not kept.residuals

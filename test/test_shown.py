@@ -10,8 +10,8 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.api.compensation import Comparison
 from actuator_glue.inference.bands import band
+from actuator_glue.report.as_text import LINES, as_text
 from actuator_glue.report.html import Note, Table
-from actuator_glue.report.plain import LINES, plain
 
 PNG = b'\x89PNG'
 
@@ -61,7 +61,7 @@ def test_a_diagnosis_is_short(record: ag.Record) -> None:
     assert 'array(' not in ag.Diagnosis.__repr__.__qualname__
     assert type(found).__repr__ is ag.Calibration.__repr__
     blocks = [Note('the verdict'), Table(('a', 'b'), [(f'r{i}', i) for i in range(100)], 'rows')]
-    lines = plain(blocks, 'see there').splitlines()
+    lines = as_text(blocks, 'see there').splitlines()
     assert lines[0] == 'the verdict' and len(lines) == LINES
     assert lines[-1] == f'... {103 - LINES + 1} more lines: see there'
     assert lines[3] == '  r0    0'

@@ -155,6 +155,17 @@ def test_rths_takes_files(
     for wrong in nothing:
         with pytest.raises(InputError, match='is no calibration'):
             api.rths('benchmark_case_1', wrong)
+    with pytest.raises(InputError, match=r'partition is \{\}'):
+        api.rths({}, posterior)
+    for option in ('ground_motion', 'criteria'):
+        with pytest.raises(InputError, match=f'{option} is 3'):
+            api.rths('benchmark_case_1', posterior, **{option: 3})
+    with pytest.raises(InputError, match=r'^monday.npz: there is no such file$'):
+        api.rths('benchmark_case_1', 'monday.npz')
+    response: Any = posterior.frequency_response
+    with pytest.raises(InputError, match="frequencies is 'low'"):
+        response(250e3, 'low')
+    assert response(250e3, 2).frequency.tolist() == [2.0]
 
 
 @pytest.mark.parametrize('kind', SAME)

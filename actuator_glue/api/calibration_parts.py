@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_glue.api.frame import frame
+from actuator_glue.json_value import json_value
 from actuator_glue.model.force_errors import transducer
-from actuator_glue.motion import METRES
+from actuator_glue.motion import METRES, spoken
 from actuator_glue.records import Array, Record
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 # Logarithm of a transducer's gain beyond which its scale is doubted.
 _OFF = 0.05
@@ -52,9 +57,46 @@ def marginals_json(parameters: Mapping[str, Marginal], draws: Array) -> dict[str
     """
     ends = np.quantile(draws, (0.025, 0.975), axis=0).T
     return {
-        name: {**asdict(p), 'lower': float(low), 'upper': float(high)}
+        name: json_value({**asdict(p), 'lower': low, 'upper': high})
         for (name, p), (low, high) in zip(parameters.items(), ends, strict=True)
     }
+
+
+def marginals_frame(
+    parameters: Mapping[str, Marginal], draws: Array, motion: str, index: str
+) -> DataFrame:
+    """Return a table of parameters, a row for each by its name.
+
+    Args:
+        parameters: posterior of each.
+        draws: shape (m, p), in their order.
+        motion: what the records move in, which units are said in.
+        index: what a row is called after.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    ends = np.quantile(draws, (0.025, 0.975), axis=0).T
+    rows = [
+        {
+            index: name,
+            'unit': spoken(p.unit, motion),
+            'mean': p.mean,
+            'stddev': p.stddev,
+            'lower': lower,
+            'upper': upper,
+            'best': p.best,
+            'skewness': p.skewness,
+            'cov': p.cov,
+            'rhat': p.rhat,
+            'ess': p.ess,
+            'prior_lower': p.bounds[0],
+            'prior_upper': p.bounds[1],
+            'prior_dominated': p.prior_dominated,
+        }
+        for (name, p), (lower, upper) in zip(parameters.items(), ends, strict=True)
+    ]
+    return frame(rows, index)
 
 
 @dataclass(frozen=True, slots=True)

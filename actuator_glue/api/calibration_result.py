@@ -10,15 +10,14 @@ import numpy as np
 
 from actuator_glue.api import store
 from actuator_glue.api.calibration_data import CalibrationData
-from actuator_glue.api.calibration_parts import marginals_json
+from actuator_glue.api.calibration_parts import marginals_frame, marginals_json
 from actuator_glue.api.drawn import Drawn
-from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
-from actuator_glue.motion import speaking, spoken
+from actuator_glue.motion import speaking
 
 if TYPE_CHECKING:
     import arviz
@@ -86,27 +85,7 @@ class Calibration(PosteriorModel, CalibrationData):
         Raises:
             InputError: pandas is not installed.
         """
-        ends = np.quantile(self.posterior, (0.025, 0.975), axis=0).T
-        rows = [
-            {
-                'parameter': name,
-                'unit': spoken(p.unit, self.motion),
-                'mean': p.mean,
-                'stddev': p.stddev,
-                'lower': lower,
-                'upper': upper,
-                'best': p.best,
-                'skewness': p.skewness,
-                'cov': p.cov,
-                'rhat': p.rhat,
-                'ess': p.ess,
-                'prior_lower': p.bounds[0],
-                'prior_upper': p.bounds[1],
-                'prior_dominated': p.prior_dominated,
-            }
-            for (name, p), (lower, upper) in zip(self.parameters.items(), ends, strict=True)
-        ]
-        return frame(rows, 'parameter')
+        return marginals_frame(self.parameters, self.posterior, self.motion, 'parameter')
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of schema `actuator_glue.calibration/1` (draws left out)."""

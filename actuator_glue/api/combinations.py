@@ -12,7 +12,7 @@ import numpy as np
 from actuator_glue.api import judgement, store
 from actuator_glue.api.calibration import Progress, calibrate
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
-from actuator_glue.api.calibration_parts import Marginal, marginals_json
+from actuator_glue.api.calibration_parts import Marginal, marginals_frame, marginals_json
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.api.given import Records, records_given
@@ -32,6 +32,7 @@ from actuator_glue.records import Array, Record, source_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from actuator_glue.report import html
     from actuator_glue.report.first_page import FirstPage
@@ -60,6 +61,14 @@ class Combinations(Result, CombinationsData):
     def model_effects(self) -> tuple[str, ...]:
         """Effects of the model beyond Eq. (2)."""
         return self.effects
+
+    def to_dataframe(self) -> DataFrame:
+        """Return a table of the combinations, a row for each; columns as of a calibration's.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        return marginals_frame(self.combinations, self.posterior, self.motion, 'combination')
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of schema `actuator_glue.combinations/1` (draws left out)."""

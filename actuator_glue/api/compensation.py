@@ -47,11 +47,11 @@ class Comparison:
 
     def __repr__(self) -> str:
         """Return the table of compensators and which one to use."""
+        from actuator_glue.report.as_text import as_text
         from actuator_glue.report.html import Table, Text
-        from actuator_glue.report.plain import plain
 
         table = Table(HEADER, self.rows(), 'Compensators')
-        return plain([Text(f'use {self.best}'), table], '`to_json()` has them')
+        return as_text([Text(f'use {self.best}'), table], '`to_json()` has them')
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each compensator, under HEADER."""

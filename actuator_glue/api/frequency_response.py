@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import vector
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -143,7 +144,7 @@ def recorded_response(
 
 
 def _positive(frequencies: ArrayLike) -> Array:
-    hertz = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+    hertz = np.atleast_1d(vector(frequencies, 'frequencies'))
     if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
         raise InputError('frequencies must be positive numbers [Hz]')
     return np.sort(hertz)

@@ -83,9 +83,9 @@ class Result(ABC):
 
     def __repr__(self) -> str:
         """Return what came out in a few lines, without arrays."""
-        from actuator_glue.report.plain import plain
+        from actuator_glue.report.as_text import as_text
 
-        told = plain(self.brief(), '`to_json()` has them, `report(path)` shows them')
+        told = as_text(self.brief(), '`to_json()` has them, `report(path)` shows them')
         return spoken(told, self.motion)
 
     def _repr_html_(self) -> str:

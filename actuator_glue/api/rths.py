@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 from typing import TypedDict, Unpack
 
@@ -23,7 +24,7 @@ from actuator_glue.api.stability import StabilityResult
 from actuator_glue.api.stability_data import AtFrequency, DelayMargin
 from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
-from actuator_glue.given import number, whole
+from actuator_glue.given import number, of_kind, whole
 from actuator_glue.hybrid import stability
 from actuator_glue.hybrid.actuator import nonlinear
 from actuator_glue.hybrid.compensator import Compensator
@@ -108,6 +109,10 @@ def rths(
     seed, draws = seed_given(seed), whole(draws, 'draws')
     calibration = calibration_given(calibration)
     frequencies = [number(f, 'frequencies') for f in np.ravel(np.asarray(frequencies, object))]
+    of_kind(partition, 'partition', (Partition, str, PathLike), 'its YAML file, or its name')
+    motion_kinds = (GroundMotion, str, PathLike, type(None))
+    of_kind(ground_motion, 'ground_motion', motion_kinds, "a file, or 'artificial'")
+    of_kind(criteria, 'criteria', (Mapping, type(None)), "limits by name, as {'drift': 0.005}")
     criteria = {n: number(v, f'criterion {n}') for n, v in (criteria or {}).items()}
     if draws < 2:
         raise InputError(f'{draws} draws are no distribution; use at least 2')

@@ -79,8 +79,10 @@ def _check_kind(path: Path, what: str) -> None:
     """Refuse what is no .npz file: numpy would say how to load it unsafely.
 
     Raises:
-        InputError: a file of another kind.
+        InputError: no file, or one of another kind.
     """
+    if not path.exists():
+        raise InputError(f'{path}: there is no such file')
     if path.is_file() and not zipfile.is_zipfile(path):
         raise InputError(f'{path}: holds no {what}: it is no .npz file, or a damaged one')
 

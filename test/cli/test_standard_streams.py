@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from actuator_glue.cli import info
-from actuator_glue.cli._streams import StandardStream
+from actuator_glue.cli._standard_streams import StandardStream
 from actuator_glue.cli.main import main
 
 COMMAND = [sys.executable, '-m', 'actuator_glue.cli.main']
@@ -126,7 +126,7 @@ def test_no_file_takes_the_number_of_a_closed_stream(tmp_path: Path, closed: str
     """Also where standard input is closed, whose number is lower: libraries print to 1 and 2."""
     code = (
         'import os, sys\n'
-        'from actuator_glue.cli._streams import standard_streams\n'
+        'from actuator_glue.cli._standard_streams import standard_streams\n'
         'with standard_streams():\n'
         '    files = [open(f"{sys.argv[1]}/{i}", "w") for i in range(3)]\n'
         '    for number in (1, 2):\n'
