@@ -6,7 +6,7 @@ from datetime import timedelta
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -157,6 +157,8 @@ def test_rths_takes_files(
             api.rths('benchmark_case_1', wrong)
     with pytest.raises(InputError, match=r'partition is \{\}'):
         api.rths({}, posterior)
+    with pytest.raises(InputError, match='partition is 3'):
+        posterior.report(tmp_path / 'p.html', partition=cast(Any, 3))
     for option in ('ground_motion', 'criteria'):
         with pytest.raises(InputError, match=f'{option} is 3'):
             api.rths('benchmark_case_1', posterior, **{option: 3})

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from actuator_glue.api.frequency_response import Limits
+from actuator_glue.api.partition_given import partition_given
 from actuator_glue.hybrid.margin import pure_delay_margin
 from actuator_glue.hybrid.partition import Partition
-from actuator_glue.io.partition import read_partition
 
 
 def hybrid_meaning(
@@ -28,8 +28,7 @@ def hybrid_meaning(
     Raises:
         InputError: a partition that cannot be used.
     """
-    if not isinstance(partition, Partition):
-        partition = read_partition(partition)
+    partition = partition_given(partition)
     lowest = float(min(partition.natural_frequencies))
     delay = delay_at(partition.specimen.stiffness, lowest)
     middle, low, high = (1e3 * float(values[0]) for values in delay)
@@ -44,4 +43,5 @@ def hybrid_meaning(
         told = 'it is unstable without a compensator'
     else:
         told = 'whether it is stable is open'
-    return f'{name}: it bears {margin:.2f} ms of delay, {has}: {told}; rths tells more.'
+    bears = f'it bears {margin:.2f} ms of delay' if margin > 0.0 else 'it bears no delay at all'
+    return f'{name}: {bears}, {has}: {told}; rths tells more.'

@@ -19,6 +19,7 @@ from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.effect_cost import effect_costs, margins
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.options import takes
+from actuator_glue.api.partition_given import partition_given
 from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.api.stability_data import AtFrequency, DelayMargin
@@ -35,7 +36,6 @@ from actuator_glue.hybrid.partition import Partition
 from actuator_glue.hybrid.stability import Flags
 from actuator_glue.hybrid.virtual import DIVERGED, VirtualTest
 from actuator_glue.io.ground_motion import read_ground_motion
-from actuator_glue.io.partition import read_partition
 from actuator_glue.records import Array
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
@@ -109,7 +109,6 @@ def rths(
     seed, draws = seed_given(seed), whole(draws, 'draws')
     calibration = calibration_given(calibration)
     frequencies = [number(f, 'frequencies') for f in np.ravel(np.asarray(frequencies, object))]
-    of_kind(partition, 'partition', (Partition, str, PathLike), 'its YAML file, or its name')
     motion_kinds = (GroundMotion, str, PathLike, type(None))
     of_kind(ground_motion, 'ground_motion', motion_kinds, "a file, or 'artificial'")
     of_kind(criteria, 'criteria', (Mapping, type(None)), "limits by name, as {'drift': 0.005}")
@@ -117,8 +116,7 @@ def rths(
     if draws < 2:
         raise InputError(f'{draws} draws are no distribution; use at least 2')
     started = time.perf_counter()
-    if not isinstance(partition, Partition):
-        partition = read_partition(partition)
+    partition = partition_given(partition)
     if ground_motion is not None and not isinstance(ground_motion, GroundMotion):
         ground_motion = read_ground_motion(ground_motion)
     _check(partition, frequencies, ground_motion, criteria)

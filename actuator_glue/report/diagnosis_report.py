@@ -194,9 +194,9 @@ def _structures(found: DiagnosisData) -> Table:
         ['structure', 'leaves of blocks left out [um]', 'price [nats]', 'log weight [nats]'],
         rows,
         f'The table: {len(found.structures)} structures were refitted, '
-        'those of the greatest weight stand here, and Eq. (2). Structures with as many effects are '
-        'told apart by smaller differences of error than those with more or fewer: Eq. (2) may '
-        'weigh more than a wrong name that leaves less.',
+        'those of the greatest weight stand here, and Eq. (2). Structures with as many effects '
+        'are told apart by smaller differences of error than those with more or fewer: Eq. (2) '
+        'may weigh more than a wrong name that leaves less.',
         prose=True,
     )
 
