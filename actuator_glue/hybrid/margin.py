@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.hybrid.linear_system import Complex, System, bilinear, crossings, held
+from actuator_glue.hybrid.linear_system import Complex, System, bilinear, closed, crossings, held
 from actuator_glue.hybrid.loop import substructures
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.records import Array
@@ -96,8 +96,10 @@ def pure_delay_margin(partition: Partition) -> tuple[float, float]:
     """
     loop = nominal(partition)
     continuous = float(delay_margin(loop)[0][0])
-    sampled = float(sampled_delay_margin(loop, partition.period)[0][0])
-    return continuous, sampled - partition.computation_delay
+    later, sooner = (float(found[0]) for found in sampled_delay_margin(loop, partition.period))
+    roots = np.linalg.eigvals(closed(held(loop, partition.period))[0])
+    lost = later > 0.0 and np.abs(roots).max() > 1.0  # by the held force alone
+    return continuous, (-sooner if lost else later) - partition.computation_delay
 
 
 def nominal(partition: Partition) -> System:

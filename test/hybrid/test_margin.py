@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from actuator_glue.api.frequency_response import Limits
+from actuator_glue.api.hybrid_meaning import hybrid_meaning
 from actuator_glue.hybrid.linear_system import System, closed, crossings, held, series
 from actuator_glue.hybrid.margin import (
     classical_margins,
@@ -137,6 +139,19 @@ def test_no_delay_is_borne_by_a_heavy_specimen() -> None:
     partition = sdof(0.05, 0.5, mass=600.0)
     assert pure_delay_margin(partition) == (0.0, 0.0)
     assert psi(0.0) is None
+
+
+@pytest.mark.parametrize('rate', [100.0, 200.0, 330.0, 340.0, 1000.0, 4096.0])
+def test_a_held_force_may_spend_more_than_the_loop_bears(rate: float) -> None:
+    """1.5 ms by pure delay, of which the hold takes half a sample."""
+    partition = Partition([[1000.0]], [[374.0]], [[1e5]], Specimen(0.0, 0.0, 250e3), rate)
+    continuous, sampled = pure_delay_margin(partition)
+    assert 1e3 * continuous == pytest.approx(1.496, rel=1e-3)
+    assert sampled == pytest.approx(continuous - 0.5 / rate, abs=3e-5)
+    late = Limits(*np.full((3, 1), 0.02))
+    said = hybrid_meaning(partition, lambda stiffness, frequency: late)
+    assert ('it bears no delay at all' in said) == (sampled < 0.0)
+    assert 'unstable' in said
 
 
 def test_a_soft_specimen_bears_every_delay() -> None:
