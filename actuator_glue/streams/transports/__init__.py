@@ -11,7 +11,9 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
@@ -21,8 +23,6 @@ from actuator_glue.streams.seal import Seal
 
 # Messages taken at once at most: what holds up the receiver must not fill memory.
 AT_ONCE = 4096
-# Hint at messages whose values are of no use, though they are as many as the layout says.
-NO_NUMBER = 'counter or time of the last one is no number'
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,24 @@ class Listener(Protocol):
 
     def close(self) -> None:
         """Let go of sockets."""
+
+
+def samples(
+    listener: Listener, terms: Terms, values: Mapping[str, NDArray[Any]], fresh: bool = False
+) -> Rows:
+    """Return the samples of what a listener has received; what is left out it counts.
+
+    Args:
+        listener: who has received it, just now.
+        terms: the terms it listens by.
+        values: by field, as sent, each of shape (n,).
+        fresh: whether a connection begins with them.
+    """
+    rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate, fresh)
+    listener.counts.update(left_out)
+    if left_out['malformed']:
+        listener.hint = 'counter or time of the last one is no number'
+    return rows
 
 
 class Sender(Protocol):

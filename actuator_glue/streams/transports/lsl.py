@@ -15,7 +15,7 @@ from actuator_glue.records import Array
 from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
 from actuator_glue.streams.lines import places
-from actuator_glue.streams.transports import AT_ONCE, NO_NUMBER, Terms, Transport, no_seal
+from actuator_glue.streams.transports import AT_ONCE, Terms, Transport, no_seal, samples
 
 # How long `send` waits for somebody to listen [s]: discovery takes a second or two.
 PATIENCE = 30.0
@@ -73,12 +73,8 @@ class LslListener:
         columns = np.asarray(table, dtype=self._kind)
         self.counts['messages'] += len(stamps)
         values = {name: columns[:, at] for name, at in self._places.items()}
-        terms = self._terms
-        rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate)
-        self.counts.update(left_out)
-        if left_out['malformed']:
-            self.hint = NO_NUMBER
-        if rows.time is None and not left_out.total():
+        rows = samples(self, self._terms, values)
+        if rows.time is None and len(rows.command) == len(stamps):
             rows = rows._replace(time=np.asarray(stamps, dtype=np.float64))
         return [rows] if len(rows.command) else []
 

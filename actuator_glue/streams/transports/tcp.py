@@ -14,7 +14,7 @@ from actuator_glue.streams import sockets
 from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
 from actuator_glue.streams.lines import LONGEST, Lines
-from actuator_glue.streams.transports import NO_NUMBER, Terms, Transport
+from actuator_glue.streams.transports import Terms, Transport, samples
 
 # Read at once at most [bytes]; what is not read holds up the sender, not our memory.
 CHUNK = 1 << 16
@@ -83,11 +83,7 @@ class TcpListener:
         if 'command' not in values or not len(values['command']):
             return []
         self.counts['messages'] += len(values['command'])
-        terms = self._terms
-        rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate, self._fresh)
-        self.counts.update(left_out)
-        if left_out['malformed']:
-            self.hint = NO_NUMBER
+        rows = samples(self, self._terms, values, self._fresh)
         self._fresh = False
         return [rows]
 

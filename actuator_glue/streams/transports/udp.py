@@ -15,7 +15,7 @@ from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
 from actuator_glue.streams.packed import Packed
 from actuator_glue.streams.seal import SIZE
-from actuator_glue.streams.transports import AT_ONCE, NO_NUMBER, Terms, Transport
+from actuator_glue.streams.transports import AT_ONCE, Terms, Transport, samples
 
 # One sender at a time: another is listened to when the first has been silent so long [s].
 SILENT = 1.0
@@ -57,11 +57,7 @@ class UdpListener:
             return []
         self.counts['messages'] += len(payloads)
         values = self._packed.decoded(b''.join(payloads))
-        terms = self._terms
-        rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate)
-        self.counts.update(left_out)
-        if left_out['malformed']:
-            self.hint = NO_NUMBER
+        rows = samples(self, self._terms, values)
         return [rows] if len(rows.command) else []
 
     def _payload(self, message: bytes, sender: tuple[object, ...], now: float) -> bytes | None:
