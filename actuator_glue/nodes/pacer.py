@@ -11,10 +11,12 @@ from typing import NamedTuple
 LATE = 5e-3
 # A clock that is not the computer's own is looked at this often [s], and has jumped where it moves
 # on by more than this between two looks [s], and by more than so many times what has passed on
-# this computer: a node that was held up has seen no jump.
+# this computer: a node that was held up has seen no jump. Of a clock that is faster than that,
+# the times are so many of what it has shown over some seconds [1; s].
 LOOK = 5e-3
 JUMP = 1.0
 FASTEST = 10.0
+FASTER, LEARNT = 3.0, 2.0
 
 
 class Step(NamedTuple):
@@ -59,6 +61,7 @@ class Pacer:
         self._jumped = jumped
         self._stop = threading.Event()
         self._start = self._seen = self._looked = 0.0
+        self._since = 0.0, 0.0
         self.late = 0
         self.latest = 0.0
         self._thread = threading.Thread(target=self._run, name='pacer', daemon=True)
@@ -97,6 +100,7 @@ class Pacer:
                 # The first step is made before the stream begins: what it takes is not lateness.
                 self._start = self._seen = self._now()
                 self._looked = time.monotonic()
+                self._since = self._seen, self._looked
                 begun = True
             if self._speed > 0.0:
                 self._wait(step.due / self._speed)
@@ -107,6 +111,11 @@ class Pacer:
     def _now(self) -> float:
         return time.monotonic() if self._clock is None else self._clock()
 
+    def _fastest(self) -> float:
+        """Return how fast the clock may run, by what it has shown since it began or jumped."""
+        clock, steady = self._seen - self._since[0], self._looked - self._since[1]
+        return max(FASTEST, FASTER * clock / steady) if steady > LEARNT else FASTEST
+
     def _wait(self, due: float) -> None:
         """Wait until a step is due; note where it is late."""
         waited = False
@@ -115,8 +124,10 @@ class Pacer:
             if self._clock is not None:
                 looked = time.monotonic()
                 moved, passed = now - self._seen, looked - self._looked
+                jumped = not 0.0 <= moved <= max(JUMP, self._fastest() * passed)
                 self._seen, self._looked = now, looked
-                if not 0.0 <= moved <= max(JUMP, FASTEST * passed):
+                if jumped:
+                    self._since = now, looked
                     # What is late by now is due now: stamps go on from here, and would run ahead.
                     self._start = max(self._start + moved, now - due)
                     self._jumped()

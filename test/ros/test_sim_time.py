@@ -246,6 +246,37 @@ def test_a_stream_that_was_held_up_has_seen_no_jump(monkeypatch):
     assert over.wait(60.0) and done == [3.0, 506.0, 506.5]
 
 
+def test_of_a_fast_clock_being_held_up_is_no_jump_either(monkeypatch):
+    """By hand: twenty seconds in one are what this clock has shown, two hundred are a jump."""
+    now, steady, over, done, jumps = [0.0], [0.0], threading.Event(), [], []
+    monkeypatch.setattr(
+        'actuator_glue.nodes.pacer.time', SimpleNamespace(monotonic=lambda: steady[0])
+    )
+
+    def act(seconds, pace):
+        steady[0] += seconds
+        now[0] += pace * seconds
+        done.append(now[0])
+
+    usual = [Step(0.79 * i, partial(act, 0.04, 20.0)) for i in range(100)]
+    last = [Step(79.0, partial(act, 0.5, 20.0)), Step(89.0, partial(act, 0.5, 200.0))]
+    steps = iter([*usual, *last, Step(95.0, lambda: None)])
+    pacer = Pacer(
+        steps,
+        lambda: True,
+        1.0,
+        lambda _: over.set(),
+        lambda: now[0],
+        lambda: jumps.append(now[0]),
+    )
+    pacer.start()
+    end = time.monotonic() + 60.0
+    while not jumps and time.monotonic() < end:
+        time.sleep(0.01)
+    pacer.stop()
+    assert jumps == [pytest.approx(190.0)] and done[-2:] == pytest.approx([90.0, 190.0])
+
+
 def test_after_a_jump_nothing_is_made_in_a_hurry():
     """What was late before is due now: its stamps, made anew, would run ahead of the clock."""
     now, over, done = [0.0], threading.Event(), []
