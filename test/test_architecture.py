@@ -71,7 +71,7 @@ ARROWS = {
     'model': BOTTOM,
     'effects': BOTTOM | {'model', 'plain_yaml'},
     'inference': BOTTOM | {'model'},
-    'online': CORE,
+    'online': READY,
     'hygiene': CORE,
     'diagnosis': READY,
     'hybrid': CORE,

@@ -16,7 +16,12 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.nodes import configuration, own_effects, spin, topics
-from actuator_glue.nodes.estimator_worker import compute, compute_beside, warm_up
+from actuator_glue.nodes.estimator_worker import (
+    Afterwards,
+    compute,
+    compute_beside,
+    warm_up,
+)
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Latched, of_one_numbering
 from actuator_glue.nodes.messages import publish
@@ -25,6 +30,7 @@ from actuator_glue.nodes.silence import Silence
 from actuator_glue.nodes.tracking import publish_tracking
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion
+from actuator_glue.online.channels import ChannelFault
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import identifiable
 from actuator_glue.online.job import WindowResult
@@ -95,7 +101,7 @@ class EstimatorNode(WorkingNode):
         self.compute: deque[float] = deque(maxlen=200)
         self.latency: deque[float] = deque(maxlen=200)
         self.last: WindowResult | None = None
-        self.contradiction = Contradiction()
+        self.contradiction, self.channels = Contradiction(), ChannelFault()
         self.silence = Silence(time.monotonic())
         self.judged: deque[bool] = deque(maxlen=JUDGED)
         # Before the first samples: what they will be estimated with is known from the start.
@@ -168,6 +174,8 @@ class EstimatorNode(WorkingNode):
                 self._say_identifiable()
             elif isinstance(event, Restarted):
                 self.complain(event.reason, event.message)
+            if isinstance(event, Restarted) and event.reason in ('setup', 'stream'):
+                self.channels = ChannelFault()  # others, maybe
 
     def _say_unused(self) -> None:
         """Complain while the set-up that governs the present samples lets none be used."""
@@ -213,9 +221,8 @@ class EstimatorNode(WorkingNode):
             self.complain('internal error', str(answer.payload), ERROR)
         elif answer.kind == PROGRESS and self.estimator.running is not None:
             self._finish(answer.payload, answer.seconds)
-        elif answer.kind == DONE and answer.payload is not None:
-            for complaint in publish_tracking(self._out, answer.payload, self._frequencies):
-                self.complain('tracking', complaint)
+        elif answer.kind == DONE:
+            self._take_afterwards(answer.payload)
         self._next(time.monotonic())
 
     def _finish(self, result: WindowResult, seconds: float) -> None:
@@ -245,6 +252,12 @@ class EstimatorNode(WorkingNode):
                 f'window {result.window.number} took {latency:.3f} s from its last sample, '
                 f'budget {self.settings.time_budget:g} s',
             )
+
+    def _take_afterwards(self, found: Afterwards) -> None:
+        self.channels.take(found.fault)
+        if found.tracked is not None:
+            for complaint in publish_tracking(self._out, found.tracked, self._frequencies):
+                self.complain('tracking', complaint)
 
     def _sample_beside(self) -> None:
         """Have another structure sampled by a process that no window waits for."""
@@ -357,6 +370,9 @@ class EstimatorNode(WorkingNode):
         self.health.values['converged windows'] = f'{sum(self.judged)} of {len(self.judged)}'
         if len(self.judged) == JUDGED and 2 * sum(self.judged) < JUDGED:
             self.complain('sampling', f'most of the last {JUDGED} windows have not converged')
+        if self.channels.fault:
+            text = f'{self.channels.fault}; until then posteriors say nothing of the actuator'
+            self.complain('channels', text)
         if self.last is None:
             return
         since, window = self.contradiction.since_ns, self.last.window

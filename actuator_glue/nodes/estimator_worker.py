@@ -9,6 +9,7 @@ from collections import deque
 from typing import NamedTuple
 
 from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, window_tracking
+from actuator_glue.online.channels import fault
 from actuator_glue.online.job import WindowResult, renew, run
 from actuator_glue.online.window_posterior import Job, WindowFit
 from actuator_glue.workers.warm import warm_prior, warm_windows
@@ -71,14 +72,30 @@ class Tracked(NamedTuple):
     numbers: RecordTracking
 
 
-def compute(
-    job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell
-) -> Tracked | None:
+class Afterwards(NamedTuple):
+    """What is found of a window whose result went ahead.
+
+    Attributes:
+        fault: what speaks against the stream's channels, as `channels.fault` says it.
+        tracked: delay and amplitude at the frequencies; None where the deadline leaves no time
+            for them, or without a posterior.
+    """
+
+    fault: str | None
+    tracked: Tracked | None
+
+
+def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell) -> Afterwards:
     """Compute a job in the worker and send its WindowResult before a monotonic time [s].
 
-    Sampling ends early enough for what follows it, as long as that took lately. Tracking numbers,
-    delay and amplitude at the frequencies [Hz], come afterwards where the deadline leaves time for
-    them; None where not, or without a posterior.
+    Sampling ends early enough for what follows it, as long as that took lately. What nobody waits
+    for comes afterwards.
+
+    Args:
+        job: what to compute.
+        deadline: when the result has to be there [s].
+        frequencies: at which delay and amplitude are wanted [Hz].
+        tell: sends the result.
     """
     last = time.monotonic()
     end = deadline - 1.3 * _REPORT.seconds - ON_THE_WAY - SLACK * job.settings.time_budget
@@ -94,6 +111,14 @@ def compute(
     # publishes nothing before the worker rests.
     tell(result)
     time.sleep(ON_THE_WAY)
+    stretch = job.window.stretch
+    found = None if stretch is None else fault(stretch)
+    return Afterwards(found, _tracked(result, deadline, frequencies))
+
+
+def _tracked(
+    result: WindowResult, deadline: float, frequencies: tuple[float, ...]
+) -> Tracked | None:
     now = time.monotonic()
     if now > deadline - 1.3 * _TRACKING.seconds - ON_THE_WAY:
         _TRACKING.fade()  # slow moments must not end them for good
@@ -130,7 +155,7 @@ def warm_up() -> None:
 
 
 def computed(job: Job, deadline: float) -> tuple[WindowResult, Tracked | None]:
-    """Return what `compute` tells and returns, with the numbers at the usual frequencies."""
+    """Return what `compute` tells and finds afterwards at the usual frequencies."""
     told: list[WindowResult] = []
-    tracked = compute(job, deadline, FREQUENCIES, told.append)
-    return told[0], tracked
+    afterwards = compute(job, deadline, FREQUENCIES, told.append)
+    return told[0], afterwards.tracked

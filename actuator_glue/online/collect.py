@@ -55,7 +55,8 @@ class Collector:
         events, windows = self._windows.push(block)
         if windows and self._kept and windows[0].epoch != self._kept[-1].epoch:
             self.forget()  # another actuator
-        self._kept.extend(windows)
+        # In a piece's record there is all that is kept.
+        self._kept.extend(replace(window, stretch=None) for window in windows)
         self._pieces += len(windows)
         return events
 

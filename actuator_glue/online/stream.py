@@ -33,6 +33,8 @@ class Window:
         segment: counts the restarts; samples of one segment are contiguous.
         recent: the record, preceded by earlier samples of the last two hops if it is shorter: all
             samples that judge the forecast of the window two hops before.
+        stretch: samples that show whether the channels can be what they are said to be, with their
+            force; None of most windows, so that no sample is in two of them.
     """
 
     number: int
@@ -40,6 +42,7 @@ class Window:
     epoch: int
     segment: int
     recent: Record
+    stretch: Record | None = None
 
     @property
     def end(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,9 @@ from actuator_glue.setups import Setups, StreamSetup
 
 # Longest stretch over which stamps are compared with index and period [s].
 _RATE_SECONDS = 3.0
+# Samples of so long show whether channels can be what they are said to be [s]; one of noise of
+# 0.2 to 8 Hz showed it in 2 s, and slower motion needs more.
+_STRETCH_SECONDS = 5.0
 
 
 class WrongRateError(InputError):
@@ -47,11 +51,11 @@ class Tally:
 
 
 class Tail:
-    """The last `keep` samples of two channels, in memory that does not grow."""
+    """The last `keep` samples, in memory that does not grow; a force that is not there is NaN."""
 
     def __init__(self, keep: int) -> None:
         self.keep = keep
-        self._data = np.empty((2, 2 * keep))
+        self._data = np.empty((3, 2 * keep))
         self._stop = 0
         self._count = 0
 
@@ -62,22 +66,23 @@ class Tail:
         """Forget all samples."""
         self._stop = self._count = 0
 
-    def append(self, command: Array, measured: Array) -> None:
+    def append(self, block: Block) -> None:
         """Append samples; at most `keep` at once."""
-        n = len(command)
+        n = len(block)
         if self._stop + n > self._data.shape[1]:
             kept = min(self._count, self.keep)
             self._data[:, :kept] = self._data[:, self._stop - kept : self._stop].copy()
             self._stop = kept
-        self._data[0, self._stop : self._stop + n] = command
-        self._data[1, self._stop : self._stop + n] = measured
+        here = self._data[:, self._stop : self._stop + n]
+        here[0], here[1] = block.command, block.measured
+        here[2] = np.nan if block.force is None else block.force
         self._stop += n
         self._count = min(self._count + n, self.keep)
 
-    def last(self, n: int) -> tuple[Array, Array]:
-        """Return views of command and measured of the last n samples."""
-        part = self._data[:, self._stop - n : self._stop]
-        return part[0], part[1]
+    def last(self, n: int) -> tuple[Array, Array, Array]:
+        """Return views of command, measured and force of the last n samples."""
+        command, measured, force = self._data[:, self._stop - n : self._stop]
+        return command, measured, force
 
 
 class SlidingWindows:
@@ -97,7 +102,7 @@ class SlidingWindows:
         self.current: StreamSetup | None = None
         self._setups = Setups()
         self._tail: Tail | None = None
-        self._window = self._hop = 0
+        self._window = self._hop = self._recent = self._stretch = 0
         self._next: int | None = None
         self._stamp_ns = 0
         self._last_stamp_ns = 0
@@ -242,7 +247,9 @@ class SlidingWindows:
         if before is None or self._tail is None or not same_period(setup.period, before.period):
             self._window = max(2, round(self.settings.window / setup.period))
             self._hop = max(1, round(self.settings.hop / setup.period))
-            self._tail = Tail(max(self._window, 2 * self._hop))
+            self._recent = max(self._window, 2 * self._hop)
+            self._stretch = self._hop * math.ceil(_STRETCH_SECONDS / setup.period / self._hop)
+            self._tail = Tail(max(self._recent, self._stretch))
         index = setup.index if self._next is None else max(setup.index, self._next)
         known = 'unknown' if setup.stiffness is None else f'{setup.stiffness:g} N/m'
         message = (
@@ -259,7 +266,7 @@ class SlidingWindows:
         while start < len(block):
             here = block.index + start
             stop = min(len(block), start + self._hop - here % self._hop)
-            tail.append(block.command[start:stop], block.measured[start:stop])
+            tail.append(block.part(start, stop))
             end = block.index + stop
             full = end % self._hop == 0 and len(tail) >= self._window
             if full and setup.stiffness is not None:
@@ -269,11 +276,12 @@ class SlidingWindows:
     def _cut(self, block: Block, stop: int, setup: StreamSetup, tail: Tail) -> Window:
         """Return the window that ends with the sample before `stop` of a block."""
 
-        def last(count: int) -> Record:
-            command, measured = tail.last(count)
+        def last(count: int, *, pushed: bool = False) -> Record:
+            command, measured, force = tail.last(count)
             return Record(
                 command=command,
                 measured=measured,
+                force=force if pushed and not np.isnan(force).any() else None,
                 period=setup.period,
                 stiffness=setup.stiffness,
                 start_ns=block.stamp_ns + round((stop - count) * block.period * 1e9),
@@ -284,7 +292,10 @@ class SlidingWindows:
             )
 
         record = last(self._window)
-        recent = record if len(tail) == self._window else last(len(tail))
+        reach = min(len(tail), self._recent)
+        recent = record if reach == self._window else last(reach)
+        whole = (block.index + stop) % self._stretch == 0 and len(tail) >= self._stretch
+        stretch = last(self._stretch, pushed=True) if whole else None
         number = self.tally.windows
         self.tally.windows += 1
-        return Window(number, record, self._epoch, self.tally.restarts, recent)
+        return Window(number, record, self._epoch, self.tally.restarts, recent, stretch)

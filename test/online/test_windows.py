@@ -13,7 +13,7 @@ from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Rejected, Restarted
 from actuator_glue.online.windows import SlidingWindows, Tail, WrongRate
 from actuator_glue.records import same_period
-from actuator_glue.sample_block import MAX_BLOCK
+from actuator_glue.sample_block import MAX_BLOCK, Block
 
 SETTINGS = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
 WINDOW, HOP = 100, 40
@@ -99,10 +99,11 @@ def test_memory_is_bounded_by_the_window(sizes):
     for size in sizes:
         values = np.arange(len(seen), len(seen) + size, dtype=float)
         seen = np.concatenate([seen, values])
-        tail.append(values, -values)
+        tail.append(Block(0, 0.01, 0, values, -values, 2.0 * values))
     count = min(len(seen), 50)
-    assert len(tail) == count and tail._data.size == 4 * 50
-    command, measured = tail.last(count)
+    assert len(tail) == count and tail._data.size == 6 * 50
+    command, measured, force = tail.last(count)
+    assert np.array_equal(force, 2.0 * seen[-count:])
     assert np.array_equal(command, seen[-count:]) and np.array_equal(measured, -seen[-count:])
 
 

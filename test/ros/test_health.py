@@ -12,6 +12,7 @@ from ros_nodes import NotReady
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.nodes import estimator
+from actuator_glue.nodes.estimator_worker import Afterwards
 from actuator_glue.nodes.health import LOGGED_PER_SECOND, REMEMBER, Health, Rate
 from actuator_glue.nodes.silence import Silence
 from actuator_glue.online.job import WindowResult
@@ -146,6 +147,15 @@ def test_a_rate_too_low_for_the_loop_is_a_warning(node):
     level, message, _ = told(node, result(node, 1, rate=10.0))
     assert level == DiagnosticStatus.WARN
     assert 'faster than 10 Hz can show' in message
+
+
+def test_channels_that_cannot_be_right_are_a_warning_until_they_can(node):
+    for fault in 'the channels are swapped', 'the channels are swapped':
+        node._take_afterwards(Afterwards(fault, None))
+    level, message, _ = told(node, result(node, 0))
+    assert level == DiagnosticStatus.WARN and message.startswith('the channels are swapped')
+    node._take_afterwards(Afterwards('', None))
+    assert told(node, result(node, 1))[2]['channels (count)'] == '1'
 
 
 def test_a_contradicted_prior_is_told_with_its_date_for_as_long_as_it_stands(node):

@@ -155,7 +155,9 @@ def test_a_stall_takes_the_time_for_sampling_from_no_other_window(
     monkeypatch.setattr(estimator_worker, 'time', clock)
     monkeypatch.setattr(estimator_worker, 'run', window)
     monkeypatch.setattr(estimator_worker, 'window_tracking', lambda *_: None)
-    job: Any = SimpleNamespace(settings=SimpleNamespace(time_budget=0.8))
+    job: Any = SimpleNamespace(
+        settings=SimpleNamespace(time_budget=0.8), window=SimpleNamespace(stretch=None)
+    )
     estimator_worker._REPORT.forget()
     estimator_worker._TRACKING.forget()
     for _ in range(20):

@@ -1,0 +1,106 @@
+"""Channels of a stream that cannot be what they are said to be; good streams are left alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from online_streams import RATE, record, setup, stream
+
+from actuator_glue.model import linear
+from actuator_glue.online.channels import ChannelFault, fault
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.windows import SlidingWindows
+
+GOOD = record(5.0)
+PUSHES = replace(GOOD, force=250e3 * GOOD.measured)
+TIME = np.arange(1000) / RATE
+
+
+def moved(command, rate=RATE):
+    """What Eq. (2) measures of a command."""
+    theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+    clean = linear.simulate(theta, command, stiffness=250e3, period=1.0 / rate)
+    measured = clean + 1e-5 * np.random.default_rng(2).standard_normal(len(clean))
+    return replace(GOOD, command=command, measured=measured, period=1.0 / rate)
+
+
+def scaled(of, factor):
+    """Both displacements in another unit."""
+    return replace(of, command=factor * of.command, measured=factor * of.measured)
+
+
+@pytest.mark.parametrize(
+    ('stretch', 'told'),
+    [
+        (replace(GOOD, command=GOOD.measured, measured=GOOD.command), 'swapped'),
+        (replace(GOOD, measured=-GOOD.measured), 'change the sign'),
+        (replace(GOOD, measured=10.0 * GOOD.measured), 'units of both channels'),
+        (scaled(GOOD, 1e3), 'a column in millimetres'),
+        (scaled(GOOD, 400.0), 'units of its channel'),
+        (scaled(PUSHES, 50.0), 'units of the force channel'),
+        (scaled(GOOD, 1e-3), 'units of its channel'),
+        (scaled(PUSHES, 5e-3), 'units of the force channel'),
+        (replace(GOOD, stiffness=250.0), 'in N/m'),
+    ],
+)
+def test_what_a_file_may_not_have_is_told_of_a_stream(stretch, told):
+    assert told in fault(stretch)
+
+
+def test_a_fast_stream_is_judged_as_any_other():
+    fast = record(5.0, rate=20_000.0)
+    assert fault(fast) == ''
+    assert 'swapped' in fault(replace(fast, command=fast.measured, measured=fast.command))
+
+
+@pytest.mark.parametrize(
+    'command',
+    [
+        2e-3 * np.sin(2.0 * np.pi * 1.0 * TIME),
+        2e-3 * np.sin(2.0 * np.pi * 0.05 * TIME),
+        1e-4 * np.sin(2.0 * np.pi * 6.0 * TIME),
+        2e-3 * np.sin(2.0 * np.pi * 1.0 * TIME * TIME),
+        1e-3 * TIME,
+        2e-3 * (TIME > 2.5),
+        np.where(TIME > 4.5, 1e-3 * np.sin(2.0 * np.pi * 3.0 * TIME), 0.0),
+        0.05 * np.sin(2.0 * np.pi * 0.3 * TIME),
+    ],
+)
+def test_nothing_is_said_of_a_good_stream(command):
+    assert fault(moved(command)) == ''
+    assert fault(replace(PUSHES, force=-PUSHES.force)) == ''
+
+
+def test_a_stream_at_rest_says_nothing():
+    rng = np.random.default_rng(1)
+    rest = replace(GOOD, command=np.zeros(1000), measured=1e-6 * rng.standard_normal(1000))
+    assert fault(rest) is None
+    assert fault(replace(rest, command=1e-6 * rng.standard_normal(1000))) is None
+
+
+def test_a_fault_stands_from_two_stretches_on_until_one_is_good():
+    channels = ChannelFault()
+    said = []
+    for found in ('swapped by 3 ms', None, 'swapped by 4 ms', 'swapped', None, '', 'swapped'):
+        channels.take(found)
+        said.append(channels.fault)
+    assert said == ['', '', 'swapped by 4 ms', 'swapped by 4 ms', 'swapped by 4 ms', '', '']
+
+
+@pytest.mark.parametrize('force', [True, False])
+def test_stretches_share_no_sample_and_are_whole(force):
+    settings = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
+    windows = SlidingWindows(settings)
+    windows.setup(setup())
+    given = record(17.0)
+    given = replace(given, force=250e3 * given.measured) if force else given
+    found = [w for one in list(stream(given, 7))[1:] for w in windows.push(one)[1]]
+    stretches = [w.stretch for w in found if w.stretch is not None]
+    assert [s.first_index for s in stretches] == [0, 1000, 2000]
+    for one in stretches:
+        part = slice(one.first_index, one.first_index + 1000)
+        assert np.array_equal(one.measured, given.measured[part])
+        assert (one.force is not None) == force
+        assert not force or np.array_equal(one.force, given.force[part])
+    # What judges forecasts is no longer for it.
+    assert max(len(w.recent) for w in found) == 100
