@@ -42,6 +42,11 @@ class Pacer:
         clock: time that paces [s]; None for the computer's. One that stands still holds the
             stream up, and where it jumps the stream goes on from there.
         jumped: called in the thread when it has jumped.
+
+    Attributes:
+        late: how many steps were late.
+        latest: by how much the latest of them was [s].
+        behind: by how much the last step was [s].
     """
 
     def __init__(
@@ -63,7 +68,7 @@ class Pacer:
         self._start = self._seen = self._looked = 0.0
         self._since = 0.0, 0.0
         self.late = 0
-        self.latest = 0.0
+        self.latest = self.behind = 0.0
         self._thread = threading.Thread(target=self._run, name='pacer', daemon=True)
 
     def start(self) -> None:
@@ -133,6 +138,7 @@ class Pacer:
                     self._jumped()
             wait = self._start + due - now
             if wait <= 0.0:
+                self.behind = -wait
                 if not waited and wait < -LATE:
                     self.late += 1
                     self.latest = max(self.latest, -wait)

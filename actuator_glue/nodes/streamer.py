@@ -17,6 +17,8 @@ from actuator_glue.nodes.parameters import Spec
 # of a dead one after its lease of 20 s, so that more is never needed. Workers compile before their
 # nodes subscribe: that takes minutes, and is waited for without limit.
 PATIENCE_SECONDS = 30.0
+# A stream that is further behind its time is a warning [s]: it may catch up, or never.
+BEHIND_SECONDS = 1.0
 # How often a stream that waits says so [s].
 REMINDER_SECONDS = 5.0
 
@@ -152,6 +154,12 @@ class Streamer(base.SuiteNode):
                     'latest message (s)': self.pacer.latest,
                 }
             )
+            if self.active and self.pacer.behind > BEHIND_SECONDS:
+                self.complain(
+                    'behind',
+                    f'samples are published more than {BEHIND_SECONDS:g} s after their time: this '
+                    'computer is busy, or messages are too many for it; larger blocks are fewer',
+                )
 
     def _ended(self, failure: BaseException | None) -> None:
         if failure is not None:

@@ -179,6 +179,14 @@ def test_a_goal_ends_with_the_worker_that_diagnosed(start, probe):
     assert diagnoser.end() == 0
 
 
+def test_a_stream_that_its_computer_cannot_keep_up_with_says_so(start, probe):
+    # A message per sample, several times as many as Python can send.
+    simulator = start('actuator_sim', rate=20_000.0, block=1, rest=0.0)
+    probe.until(lambda: 'behind (last)' in probe.health.get('actuator_sim', {}), 120, 'behind')
+    assert 'larger blocks' in probe.value('actuator_sim', 'behind (last)')
+    assert simulator.end() == 0, simulator.text
+
+
 @pytest.mark.slow
 def test_a_simulated_clock_that_jumps_back_is_said_and_survived(start, probe):
     nodes = {
