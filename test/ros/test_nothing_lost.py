@@ -211,6 +211,25 @@ def test_a_bag_that_is_deleted_while_it_is_recorded_is_brought_back_and_told(
     assert summarise(bag).finished and 'finished' in recorder.text
 
 
+def test_a_bag_that_is_moved_while_it_is_recorded_is_told_and_whole_once_it_is_back(
+    start, probe, tmp_path
+):
+    bag, away = tmp_path / 'bag', tmp_path / 'away'
+    recorder = start('recorder', bag=str(bag))
+    probe.open_stream()
+    recording = sending(probe, lambda: probe.number('recorder', 'messages written') > 50)
+    probe.until(recording, what='recording')
+    assert not probe.faults['recorder']
+    bag.rename(away)
+    told = sending(probe, lambda: 'was moved' in probe.faults['recorder'])
+    probe.until(told, what='that it was moved')
+    away.rename(bag)
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=60.0))
+    assert recorder.end() == 0, recorder.text
+    assert np.array_equal(recorded(bag), np.arange(probe.index))
+    assert summarise(bag).finished
+
+
 @pytest.fixture
 def breakable(tmp_path):
     """A disk that goes read-only at its first error: folder, what breaks it, what remounts it."""
