@@ -248,7 +248,8 @@ class SlidingWindows:
             self._window = max(2, round(self.settings.window / setup.period))
             self._hop = max(1, round(self.settings.hop / setup.period))
             self._recent = max(self._window, 2 * self._hop)
-            self._stretch = self._hop * math.ceil(_STRETCH_SECONDS / setup.period / self._hop)
+            stretch = max(2.0, _STRETCH_SECONDS / setup.period)
+            self._stretch = self._hop * math.ceil(stretch / self._hop)
             self._tail = Tail(max(self._recent, self._stretch))
         index = setup.index if self._next is None else max(setup.index, self._next)
         known = 'unknown' if setup.stiffness is None else f'{setup.stiffness:g} N/m'

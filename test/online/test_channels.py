@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from online_streams import RATE, record, setup, stream
+from online_streams import RATE, block, record, setup, stream
 
 from actuator_glue.model import linear
 from actuator_glue.online.channels import ChannelFault, fault
@@ -104,3 +104,10 @@ def test_stretches_share_no_sample_and_are_whole(force):
         assert not force or np.array_equal(one.force, given.force[part])
     # What judges forecasts is no longer for it.
     assert max(len(w.recent) for w in found) == 100
+
+
+def test_a_stretch_of_the_slowest_stream_is_more_than_a_sample():
+    windows = SlidingWindows(EstimatorSettings(window=30.0, hop=5.0, settle=0.0))
+    windows.setup(setup(period=10.0))
+    _, found = windows.push(block(0, 6, period=10.0))
+    assert [len(w.stretch) for w in found if w.stretch is not None] == [2, 2]
