@@ -112,8 +112,8 @@ def _far(series: Series, together: Pooled) -> list[str]:
     limit = 1.0 - (1.0 - _OUTLIERS) ** (1.0 / len(series.days))
     found = left_out(series, together)
     told = []
-    for t, p_value in enumerate(found.p_value):
-        worst = int(np.argmax(np.abs(found.deviation[t]) / found.stddev[t]))
+    for t, p_value in enumerate(found.together):
+        worst = int(np.argmin(found.p_values[t]))
         told.append(
             f'{series.names[worst]} {_off(float(found.deviation[t, worst]))} its level'
             if p_value < limit

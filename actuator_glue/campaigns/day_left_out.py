@@ -4,6 +4,9 @@ Given walk and offset, the level of a day is told by the days before it and, bac
 the days after it: two filters, neither of which has seen the day itself (two-filter smoother:
 Fraser and Potter 1969). The smoothed level of `pooled` is no substitute: it holds the day, and as
 it is a mixture over draws of walk and offset, the day cannot be taken out of it again.
+
+The offset of the day that is judged has heavier tails than a normal one, as in robust
+meta-analysis (Baker and Jackson 2008): laboratories have an odd day more often than that.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 from scipy.stats import chi2, norm
 
 from actuator_glue.campaigns.day_model import JUMP, hyper_draws
@@ -19,11 +23,16 @@ from actuator_glue.campaigns.pooling import Pooled
 from actuator_glue.campaigns.series import Series
 from actuator_glue.records import Array
 
-# Of two days nobody knows which is off; one of many hardly tells walk and offset.
-_LEAST, _MANY = 3, 20
+# Of two days nobody knows which is off; one of many hardly tells walk and offset, unless it is
+# farther off than this p-value says.
+_LEAST, _MANY, _DOUBTFUL = 3, 20, 0.05
 # Standard deviation of a day that tells nothing, and draws of walk and offset without a day.
 _NOTHING, _DRAWS = 1e6, 256
-_PRIOR = 3.0  # of p-values of few days
+_FREEDOM = 4  # of the offset's Student t
+# It is a normal one whose variance is inverse chi-square: values of that, and their shares.
+_EDGES = np.concatenate([[0.0], expit(np.arange(-14.0, 5.0, 0.5)), [1.0]])
+_SHARES = np.diff(_EDGES)
+_WIDER = (_FREEDOM - 2.0) / chi2.ppf(_EDGES[:-1] + 0.5 * _SHARES, _FREEDOM)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,45 +41,48 @@ class LeftOut:
 
     Attributes:
         deviation: of its estimate from the level of all other days, logarithms, (n, p).
-        stddev: of such a deviation, or of a normal one that is as seldom, (n, p).
-        p_value: that a day is as far off or farther, all parameters together, (n,).
+        p_values: that a day is as far off or farther, of each parameter, (n, p).
     """
 
     deviation: Array
-    stddev: Array
-    p_value: Array
+    p_values: Array
+
+    @property
+    def together(self) -> Array:
+        """The p-value of each day, of all parameters together, (n,)."""
+        return np.asarray(1.0 - (1.0 - self.p_values.min(axis=1)) ** self.p_values.shape[1])
 
 
 def left_out(series: Series, together: Pooled) -> LeftOut:
-    """Return how far each day is from all others; a single day is not far from anything.
+    """Return how far each day is from all others; one or two days are not far from anything.
 
     Args:
         series: the days.
         together: what they tell. Each of its draws of walk and offset is taken by itself, and
-            p-values are averaged over them. The day has its say in these draws, which matters
-            where days are few: there each has draws from all others.
+            p-values are averaged over them. A day that is far off, or one of few, has too much say
+            in these: it gets draws from all others.
     """
     n, p = series.mean.shape
-    if n == 1:
-        return LeftOut(np.zeros((1, p)), np.full((1, p), np.inf), np.ones(1))
-    if not _LEAST <= n < _MANY:
-        return _told(*_held(series, together.walk_draws, together.offset_draws, together.jumps))
+    if n < _LEAST:
+        return LeftOut(np.zeros((n, p)), np.ones((n, p)))
+    offset = together.offset_draws
+    deviation, variance = _held(series, together.walk_draws, offset, together.jumps)
+    found = LeftOut(deviation.mean(axis=0), _seldom(deviation, variance, offset[:, None]))
     rng = np.random.default_rng(n)
-    rest = [_without(series, together.jumps, t, rng) for t in range(n)]
-    days = [_held(series, *hyper, together.jumps) for hyper in rest]
-    deviation, spread = (
-        np.stack([day[k][:, t] for t, day in enumerate(days)], axis=1) for k in (0, 1)
-    )
-    # Walk and offset are hardly known: tails are heavy. Averaged for one parameter they nearly
-    # hold their level; those of a sum of squares of several would not. Nearly: the prior has most
-    # offsets below what a test knows, so that one in 10 histories of 5 to 12 days had an outlier
-    # by chance; with a factor of 2 it is one in 18 (2400 histories), with 3 one in 33 (500).
-    far = np.abs(deviation) / np.sqrt(np.diagonal(spread, axis1=2, axis2=3))
-    each = np.clip(2.0 * norm.sf(far).mean(axis=0), 1e-300, 1.0 - 1e-9)
-    middle = deviation.mean(axis=0)
-    alike = np.abs(middle) / norm.isf(0.5 * each)
-    p_value = np.minimum(_PRIOR * (1.0 - (1.0 - each.min(axis=1)) ** p), 1.0)
-    return LeftOut(middle, alike, p_value)
+    for day in range(n) if n < _MANY else np.flatnonzero(found.together < _DOUBTFUL):
+        walk, offset = _without(series, together.jumps, day, rng)
+        off, spread = (told[:, day] for told in _held(series, walk, offset, together.jumps))
+        found.deviation[day], found.p_values[day] = off.mean(axis=0), _seldom(off, spread, offset)
+    return found
+
+
+def _seldom(deviation: Array, variance: Array, offset: Array) -> Array:
+    """Return p-values (..., p) of deviations (h, ..., p) with the scatter of days `offset`."""
+    p_values = np.zeros(deviation.shape[1:])
+    for share, wider in zip(_SHARES, _WIDER, strict=True):
+        spread = np.sqrt(variance + (wider - 1.0) * offset**2)
+        p_values += share * 2.0 * norm.sf(np.abs(deviation) / spread).mean(axis=0)
+    return p_values
 
 
 def _without(
@@ -87,7 +99,7 @@ def _without(
 
 
 def _held(series: Series, walk: Array, offset: Array, jumps: Sequence[int]) -> tuple[Array, Array]:
-    """Return deviations (h, n, p) from all other days and their covariances (h, n, p, p)."""
+    """Return deviations from all other days and their variances, (h, n, p) each."""
     scatter = _diagonal(offset**2)[:, None] + series.covariance
     between = walk[:, None] ** 2 * np.diff(series.times)[:, None]
     between[:, [k - 1 for k in jumps]] += JUMP**2
@@ -103,19 +115,7 @@ def _held(series: Series, walk: Array, offset: Array, jumps: Sequence[int]) -> t
     gain = np.linalg.solve(a + b, a).swapaxes(2, 3)
     level[:, 1:-1] += np.einsum('htab,htb->hta', gain, late[:, 1:] - early[:, :-1])
     covariance[:, 1:-1] -= gain @ a
-    return series.mean - level, scatter + covariance
-
-
-def _told(deviation: Array, spread: Array) -> LeftOut:
-    """Return what deviations (h, n, p) with covariances (h, n, p, p) tell together."""
-    weighed = np.linalg.solve(spread, deviation[..., None])[..., 0]
-    p_values = chi2.sf((deviation * weighed).sum(axis=2), deviation.shape[2])
-    variances = np.diagonal(spread, axis1=2, axis2=3)
-    return LeftOut(
-        deviation=deviation.mean(axis=0),
-        stddev=np.sqrt(variances.mean(axis=0) + deviation.var(axis=0)),
-        p_value=p_values.mean(axis=0),
-    )
+    return series.mean - level, np.diagonal(scatter + covariance, axis1=2, axis2=3)
 
 
 def _diagonal(variances: Array) -> Array:

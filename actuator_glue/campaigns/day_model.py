@@ -48,6 +48,19 @@ class Grid:
         walk, offset = np.meshgrid(walks, offsets, indexing='ij')
         return cls(walk.ravel(), offset.ravel())
 
+    def reference(self, s: Array) -> Array:
+        """Return the log density of tau's reference prior over that of the grid, (g,).
+
+        Log-uniform where the days scatter by more than tests know, falling off as tau^2 below: a
+        log-uniform prior alone has most of tau where it does not matter, and what few days tell
+        too narrow. It is Jeffreys' prior of random effects (Bodnar et al. 2017).
+
+        Args:
+            s: standard deviations of the tests, (n,).
+        """
+        share = self.offset[:, None] ** 2 / (self.offset[:, None] ** 2 + s**2)
+        return np.asarray(0.5 * np.log((share**2).sum(axis=1)))
+
     def around(self, log_likelihood: Array) -> Grid:
         """Return a finer grid around the posterior, which many days make narrower than this grid.
 
@@ -140,10 +153,9 @@ def hyper_draws(
         count: how many.
         rng: random numbers.
     """
-    coarse = log_likelihoods(times, y, s, jumps)[0]
-    grid = Grid.usual().around(coarse)
-    likelihood = log_likelihoods(times, y, s, jumps, grid=grid)[0]
-    weights = np.exp(likelihood - likelihood.max())
+    grid = Grid.usual().around(log_likelihoods(times, y, s, jumps)[0])
+    density = log_likelihoods(times, y, s, jumps, grid=grid)[0] + grid.reference(s)
+    weights = np.exp(density - density.max())
     # Strata: as many draws of each pair as its weight says, but for one.
     at = (np.arange(count) + rng.random(count)) / count
     rows = np.searchsorted(np.cumsum(weights) / weights.sum(), at).clip(max=len(weights) - 1)
