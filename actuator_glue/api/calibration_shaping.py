@@ -148,8 +148,11 @@ def automatic(problem: Problem, theta: Array, use_force: bool = False) -> Proble
 def _half(data: Data, found: Fit, which: slice) -> float:
     """Return half of what the residual of some of the records is worth."""
     parts = data.parts[which]
+    rows = zip(data.records[which], data.masks[which], strict=True)
     return 0.5 * effective_size(
-        [found.error[part] for part in parts], [found.jacobian[:, part] for part in parts]
+        [found.error[part] for part in parts],
+        [found.jacobian[:, part] for part in parts],
+        [(record.command[mask], record.measured[mask]) for record, mask in rows],
     )
 
 

@@ -11,6 +11,8 @@ from actuator_glue.api.calibration_shaping import automatic
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.effective_size import effective_size
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.inference.posterior import Problem
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -86,6 +88,49 @@ def test_an_effect_that_is_modelled_is_no_residual(rng_seed: int) -> None:
     sizes = [2.0 * automatic(problem, theta).shaping_factor for problem in problems]
     count = sum(map(len, records))
     assert sizes[0] < 0.2 * count and sizes[1] > 0.8 * count
+
+
+@pytest.mark.parametrize('noise', [0.0, 1e-6, 2e-6])
+@pytest.mark.parametrize('ramp', [0.0, 2.0])
+def test_the_rounding_of_a_repeated_sine_counts_once(noise: float, ramp: float) -> None:
+    """Rounded to 10 um: least squares miss by what G says, not by ten times that."""
+    rng, truth = np.random.default_rng(70020), np.array([128.0, 1.01e9, 2.42e5, 2.0])
+    time, missed = np.arange(4000) / RATE, []
+    for phase in rng.uniform(0.0, 2.0 * np.pi, 8):
+        command = 2e-3 * np.sin(10.0 * np.pi * time + phase)
+        command *= np.clip(time / ramp, 0.0, 1.0) if ramp else 1.0
+        records = []
+        for stiffness in (0.0, 250e3):
+            record = Record(command, np.zeros_like(command), 1.0 / RATE, stiffness)
+            clean = Structure(()).simulate(truth, record)
+            read = 1e-5 * np.round((clean + noise * rng.standard_normal(len(clean))) / 1e-5)
+            records.append(replace(record, measured=read))
+        shaping = automatic(Problem(records, choose_model()), truth).shaping_factor
+        found = fit(Data.whole(records), Structure(()), truth)
+        near = truth * (1.0 + np.vstack([np.zeros(4), 1e-4 * np.eye(4)]))
+        moved = np.concatenate([Structure(()).simulate(near, r) for r in records], axis=1)
+        slopes = (moved[1:] - moved[0]) / 1e-4
+        off = slopes.T @ (found.theta / truth - 1.0)
+        missed.append(2.0 * shaping * (off @ off) / (found.error @ found.error) / 4.0)
+    assert 0.2 < np.mean(missed) < 5.0
+
+
+@pytest.mark.parametrize('step', [0.0, 1e-5])
+def test_repeated_motion_counts_in_full_where_noise_does_not_repeat(step: float) -> None:
+    """Noise as large as the grid, or none: within what the average of the density scatters by."""
+    rng, time = np.random.default_rng(70021), np.arange(8000) / RATE
+    motion = np.sin(10.0 * np.pi * time)
+    noise = 1e-5 * rng.standard_normal(8000)
+    read = 2e-3 * motion + noise
+    read = step * np.round(read / step) if step else read
+    slopes = [np.stack([motion, np.cos(10.0 * np.pi * time)])]
+    error = [read - 2e-3 * motion]
+    plain = effective_size(error, slopes)
+    assert effective_size(error, slopes, [(motion, read)]) > 0.8 * plain
+    swept = np.sin(time**2)
+    assert effective_size(error, slopes, [(swept, read)]) == plain
+    still = np.where(time < 20.0, motion, 0.0)
+    assert effective_size(error, slopes, [(still, np.where(time < 20.0, read, 0.0))]) == plain
 
 
 def held(seed: tuple[int, ...], phi: float, evaluations: int) -> np.ndarray:
