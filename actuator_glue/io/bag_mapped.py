@@ -80,7 +80,7 @@ def read_mapped(
                 stiffness=channels.stiffness,
                 start_ns=zero + round(start * 1e9),
                 hold=hold,
-                actuator=channels.actuator,
+                actuator=channels.actuator or 'actuator',
                 source=f'{path}{number}',
                 motion=channels.motion,
             )

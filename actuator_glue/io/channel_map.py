@@ -61,9 +61,9 @@ class ChannelMap:
         delimiter: text between columns; found by itself where left out.
         decimal: decimal sign, '.' or ','; found by itself where left out.
         rest_samples: samples at rest at the start, for `remove_rest_offset`.
-        hold: how the command runs between its samples, zoh or linear.
-        stiffness: specimen stiffness [N/m].
-        actuator: name of the actuator.
+        hold: how the command runs between its samples, zoh or linear; None for what the file says.
+        stiffness: specimen stiffness [N/m]; None for what the file says.
+        actuator: name of the actuator; None for what the file says.
         stamps: of a bag's messages: header (acquisition), published or logged; the first that
             every message has where left out.
         source: the map's file, for messages.
@@ -82,7 +82,7 @@ class ChannelMap:
     rest_samples: int = 0
     hold: Literal['zoh', 'linear'] | None = None
     stiffness: float | None = None
-    actuator: str = 'actuator'
+    actuator: str | None = None
     stamps: Literal['header', 'published', 'logged'] | None = None
     source: str = ''
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -17,7 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.given import of_kind
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
-from actuator_glue.io.file_notes import noted
+from actuator_glue.io.file_notes import note_of, noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
@@ -165,20 +165,10 @@ def channels_of(
     if path.is_dir():
         raise InputError(f'{path}: this is a folder, and no bag in MCAP format; give its files')
     channels = channel_map_given(channels)
-    if channels is not None:
-        values, period, start_ns, told = _mapped(path, channels, needed)
-        _refuse_empty(path, values)
-        return Channels(
-            values,
-            period,
-            start_ns,
-            channels.stiffness,
-            channels.hold,
-            channels.actuator,
-            channels.motion,
-            told,
-        )
-    values, notes, period, start_ns, motion, told = _by_name(path, needed)
+    if channels is None:
+        values, notes, period, start_ns, motion, told = _by_name(path, needed)
+    else:
+        values, notes, period, start_ns, motion, told = _mapped(path, channels, needed)
     _refuse_empty(path, values)
     return Channels(
         values,
@@ -230,7 +220,7 @@ def _by_name(
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
     notes, period, start_ns = noted(table.notes, str(path)), table.period, table.start_ns
-    told = table.told
+    told = (*table.told, *_unscaled(table.columns[at] for at, _ in columns.values()))
     if period is not None and 'time' in values:
         _check_period(period, values['time'], path)
     del raw, table  # a long file's columns as they were read are not held beside these
@@ -252,10 +242,11 @@ def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
 
 def _mapped(
     path: Path, channels: ChannelMap, needed: tuple[str, ...]
-) -> tuple[dict[str, Array], float | None, int, tuple[str, ...]]:
-    """Return channels in SI units, rest offsets removed, period, start [ns], and what to tell.
+) -> tuple[dict[str, Array], dict[str, str], float | None, int, str, tuple[str, ...]]:
+    """Return what `_by_name` does, rest offsets removed.
 
-    There is no period where times say it.
+    The map counts, and what it leaves out is as the file says; there other words than those of
+    `NOTES` are none.
     """
     table = format_of(path).read(path, channels)
     roles = channels.roles() if needed == _NEEDED else _parts(channels, needed, table)
@@ -263,11 +254,33 @@ def _mapped(
     if counter is not None:
         _check_counter(counter, path)
     values = in_si(raw, channels, str(path), roles)
-    told = (*table.told, *_unlike_map(table, roles))
+    as_they_are = [
+        table.columns[position(c.column, table.columns, role)]
+        for role, c in roles.items()
+        if c.scale == 1.0 and c.offset == 0.0
+    ]
+    told = (*table.told, *_unlike_map(table, roles), *_unscaled(as_they_are))
+    notes = noted({n: v for n, v in table.notes.items() if note_of(n)}, str(path))
+    own = {
+        'stiffness_N_per_m': channels.stiffness,
+        'hold': channels.hold,
+        'actuator': channels.actuator,
+    }
+    notes |= {name: str(value) for name, value in own.items() if value is not None}
     if channels.rate is not None:
         _check_rate(channels.rate, values.get('time'), table, path)
-        return values, 1.0 / channels.rate, table.start_ns, told
-    return values, None, table.start_ns, told
+    period = None if channels.rate is None else 1.0 / channels.rate
+    return values, notes, period, table.start_ns, channels.motion, told
+
+
+def _unscaled(columns: Iterable[Column]) -> Iterator[str]:
+    """Yield which gains and offsets stand beside numbers that are taken as they are."""
+    said = [f'{c.name.strip()} has {c.scaling}' for c in columns if c.scaling]
+    if said:
+        yield (
+            f'{"; ".join(said)}: this is not applied, because nothing says whether the numbers '
+            'have it already. If they have not, give it as `scale` or `offset` in a channel map'
+        )
 
 
 def _unlike_map(table: FileTable, roles: dict[str, Channel]) -> Iterator[str]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.laboratory import read
 
 TIME = np.arange(1000) * 1e-3
@@ -97,3 +98,32 @@ def test_attributes_are_notes_too(tmp_path: Path) -> None:
         file.attrs['stiffness'] = 250e3
     with pytest.raises(InputError, match=r"'stiffness = 250000.0' is not understood"):
         read(path)
+
+
+MAP = {
+    'time': {'column': 'time_s', 'unit': 's'},
+    'command': {'column': 'command_mm', 'unit': 'mm'},
+    'measured': {'column': 'measured_mm', 'unit': 'mm'},
+}
+
+
+@pytest.mark.parametrize('lines', [None, 4])
+def test_what_a_channel_map_leaves_out_is_as_the_file_says(
+    tmp_path: Path, lines: int | None
+) -> None:
+    """The hold was zoh and the stiffness unknown, without a word; what the map says counts."""
+    said = ['# hold = linear', '# stiffness_N_per_m = 250e3', '# actuator = mts 3']
+    path = text(tmp_path / 'a.csv', *said)
+    heads = {} if lines is None else {'header_lines': lines}
+    record = read(path, channels=parse_channel_map(MAP | heads, 'a map'))
+    assert (record.hold, record.stiffness, record.actuator) == ('linear', 250e3, 'mts 3')
+    own = {'hold': 'zoh', 'stiffness': 0, 'actuator': 'other'}
+    record = read(path, channels=parse_channel_map(MAP | heads | own, 'a map'))
+    assert (record.hold, record.stiffness, record.actuator) == ('zoh', 0.0, 'other')
+
+
+def test_beside_a_channel_map_nearly_right_is_prose(tmp_path: Path) -> None:
+    """Whoever describes a file by a map need not mend what stands in it."""
+    path = text(tmp_path / 'a.csv', '# stiffness = 250e3', '# hold type: linear')
+    record = read(path, channels=parse_channel_map(MAP | {'hold': 'zoh'}, 'a map'))
+    assert (record.hold, record.stiffness) == ('zoh', None)

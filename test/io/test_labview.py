@@ -187,6 +187,15 @@ def test_a_heading_that_says_less_than_the_column_of_times_is_no_contradiction(
     check(labview(tmp_path / 'a.lvm', x='One', channels=changed))
 
 
+@pytest.mark.parametrize(('step', 'told'), [('0.0002', True), ('0.002', False)])
+def test_that_samples_were_left_out_is_told(tmp_path: Path, step: str, told: bool) -> None:
+    """The heading has the step of all samples, the rows that of those that were kept."""
+    found: list[str] = []
+    path = labview(tmp_path / 'a.lvm', x='One', channels={'Delta_X': (step, step)})
+    read(path, warn=found.append)
+    assert ['of 10 samples one was kept' in line for line in found] == [True] * told
+
+
 def test_a_step_of_few_digits_is_the_one_that_it_was_rounded_from(tmp_path: Path) -> None:
     """A third of a millisecond may be 0.0003, and nothing else with one digit."""
     path = labview(tmp_path / 'a.lvm', x='One', channels={'Delta_X': ('0.0003', '0.0003')})

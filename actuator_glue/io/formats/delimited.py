@@ -134,6 +134,8 @@ def read_head(
         broken = (i for i in firsts if _broken(top[i:header_lines]))
         line = ' '.join(top[next(broken, max(header_lines - 1, 0)) : header_lines])
         line = uncommented(line)
+        for above in filter(_COMMENT.match, top[:header_lines]):
+            _take_note(uncommented(above), notes, path)
     below = header_lines
     while line and not units and below < len(top):
         text, below = uncommented(top[below]), below + 1

@@ -23,6 +23,7 @@ from actuator_glue.io.formats import (
     matrix_column,
     matrix_columns,
     reading,
+    scaling,
 )
 from actuator_glue.records import Array
 
@@ -34,6 +35,7 @@ _DEEPEST, _MOST_STRUCTS = 64, 10_000  # structs in structs, and in all
 _FIELDS = ('data', 'values', 'value')
 _NAMES = ('name', 'label')
 _NAME = 'an HDF5 file'
+_PACKING = ('scale_factor', 'add_offset')  # of netCDF, and applied
 _UNITS = ('unit', 'units', 'Unit', 'Units')
 
 
@@ -136,11 +138,13 @@ class _Tree:
             if dataset.size > A_REMARK:
                 self.unread |= {f: _kind(dataset.dtype[f]) for f in others}
             fields = [f for f in fields if f not in others]
-            self.columns += [Column(f'{shown}.{f}', f) for f in fields]
+            said = scaling(dataset.attrs)
+            self.columns += [Column(f'{shown}.{f}', f, '', said) for f in fields]
             self.places += [(place, f) for f in fields]
         elif dataset.dtype.kind in 'fiu' and not (_is_text(dataset) or _OBJECT in dataset.attrs):
             shape = dataset.shape[::-1] if self._matlab else dataset.shape
-            found = matrix_columns(shown, shape, _unit(dataset))
+            said = scaling(dataset.attrs, _PACKING)
+            found = matrix_columns(shown, shape, _unit(dataset), said)
             self.columns += found
             self.places += [(place, i) for i in range(len(found))]
         elif dataset.size > A_REMARK and (fields or _CLASS not in dataset.attrs):
@@ -239,7 +243,7 @@ def _unpacked(values: Any, attributes: Any) -> Array:
     lowest, highest = _valid(attributes, values.dtype)
     missing |= (values < lowest) | (values > highest)
     unpacked = np.asarray(values, dtype=np.float64)
-    scale, offset = (attributes.get(name) for name in ('scale_factor', 'add_offset'))
+    scale, offset = (attributes.get(name) for name in _PACKING)
     if scale is not None:
         unpacked = unpacked * float(np.ravel(scale)[0])
     if offset is not None:

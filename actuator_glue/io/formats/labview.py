@@ -119,21 +119,26 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         None,
         start_ns,
         lambda row, at: entry(row, shown[at - 1] if at else (times or shown)[0]),
+        told=tuple(dict.fromkeys(c.told for c in clocks if c.told)),
     )
 
 
 class _SegmentTimes(NamedTuple):
-    """Times of a segment, in the unit of the file, and the time from which they count [ns]."""
+    """Times of a segment, in the unit of the file, and the time from which they count [ns].
+
+    And what a reader should know of them.
+    """
 
     times: Array
     start_ns: int
     stamped: bool
+    told: str
 
 
 def _clock(
     path: Path, said: _Heading, number: int, head: TextHead, times: list[int], shown: list[int]
 ) -> _SegmentTimes:
-    segment = said.segments[number]
+    segment, told = said.segments[number], ''
     if said.file.get('X_Columns', 'One').lower() == 'no':
         period = _number(path, segment, 'Delta_X', shown)
         first = _number(path, segment, 'X0', shown)
@@ -152,11 +157,11 @@ def _clock(
                 'common times, and save them with one X column'
             )
         _check_count(path, segment, shown)
-        _check_clock(path, said, segment, shown, own)
+        told = _checked_clock(path, said, segment, shown, own)
     if own[0] > _EPOCH:
-        return _SegmentTimes(own, -_EPOCH * 10**9, False)
+        return _SegmentTimes(own, -_EPOCH * 10**9, False, told)
     start_ns = _stamp_ns(path, said, segment, shown)
-    return _SegmentTimes(own, start_ns, start_ns > 0)
+    return _SegmentTimes(own, start_ns, start_ns > 0, told)
 
 
 def _check_count(path: Path, segment: _HeadedRows, shown: list[int]) -> None:
@@ -173,10 +178,10 @@ def _check_count(path: Path, segment: _HeadedRows, shown: list[int]) -> None:
         )
 
 
-def _check_clock(
+def _checked_clock(
     path: Path, said: _Heading, segment: _HeadedRows, shown: list[int], times: Array
-) -> None:
-    """Refuse a column of times that the heading contradicts.
+) -> str:
+    """Refuse a column of times that the heading contradicts; return in words where rows are few.
 
     A heading of single samples, or of the first rows of many in one X column, says nothing of
     the step: LabVIEW writes a `Delta_X` of 1 there. Where samples were decimated it is that of
@@ -188,7 +193,7 @@ def _check_clock(
     one = said.file.get('X_Columns', 'One').lower() == 'one'
     counts = [int(n) for n in _of_channels(segment, 'Samples', shown) if n.isdecimal()]
     if counts and (max(counts) <= 1 or (one and segment.rows > max(counts))):
-        return
+        return ''
     spacing = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     for name in ('Delta_X', 'X0') if one else ():
         found = [value for _, value in _numbers(segment, name, shown)]
@@ -207,6 +212,13 @@ def _check_clock(
                 f'{path}: Delta_X is {text}, but {_TIMES} goes up by {step / rate:.6g}; mend the '
                 'one that is wrong'
             )
+        if decimated:
+            return (
+                f'{_TIMES} goes up by {kept} times Delta_X ({text}): of {kept} samples one was '
+                'kept. If what comes between was not filtered out before, faster motion is in '
+                'these samples as slower one (aliasing)'
+            )
+    return ''
 
 
 def _numbers(segment: _HeadedRows, name: str, shown: list[int]) -> list[tuple[str, float]]:

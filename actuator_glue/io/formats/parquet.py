@@ -10,7 +10,15 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import Column, FileTable, Format, check_size, library, reading
+from actuator_glue.io.formats import (
+    Column,
+    FileTable,
+    Format,
+    check_size,
+    library,
+    reading,
+    scaling,
+)
 from actuator_glue.io.units import bare
 from actuator_glue.records import Array
 
@@ -33,10 +41,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             f'{path}: {rows} rows in all, but its {len(told)} row groups hold {sum(told)}: this '
             'Parquet file is damaged; copy it again from where it was written'
         )
-    notes = {
-        name.decode('utf-8', 'replace'): value.decode('utf-8', 'replace')
-        for name, value in (schema.metadata or {}).items()
-    }
+    notes = _texts(schema.metadata)
     fields = [field for field in schema if _is_number(field.type)]
     if not fields:
         raise InputError(f'{path}: no column of numbers in this Parquet file')
@@ -72,8 +77,15 @@ def _column(field: Any) -> Column:
     if _is_time(field.type):
         # Its type says its unit, whatever `time_ns` may say.
         return Column(field.name, bare(field.name), 's')
-    found = (field.metadata or {}).get(b'unit', b'')
-    return Column(field.name, field.name, str(found.decode('utf-8', 'replace')))
+    said = _texts(field.metadata)
+    return Column(field.name, field.name, said.get('unit', ''), scaling(said))
+
+
+def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
+    return {
+        name.decode('utf-8', 'replace'): value.decode('utf-8', 'replace')
+        for name, value in (metadata or {}).items()
+    }
 
 
 def _numbers(column: Any) -> Array:

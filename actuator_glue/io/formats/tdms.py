@@ -20,6 +20,7 @@ from actuator_glue.io.formats import (
     check_size,
     library,
     reading,
+    scaling,
 )
 from actuator_glue.io.units import bare, recognise
 from actuator_glue.records import Array, same_period
@@ -83,7 +84,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     # Its type says its unit, whatever `time_ns` may say.
                     label, unit = bare(label), 's'
                     stamps.add(len(columns))
-                columns.append(Column(name, label, unit))
+                columns.append(Column(name, label, unit, scaling(channel.properties)))
                 clock, fault, doubt = _whole(_clock(channel), said.get(channel.path, []))
                 clocks.append(clock)
                 broken.append(fault)
