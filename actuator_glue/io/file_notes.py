@@ -47,14 +47,6 @@ def nearly(name: str) -> bool:
     return note_of(name) is not None or _meant(name) is not None
 
 
-def states(name: str, value: str) -> bool:
-    """Return whether a name with its value behind a colon is a note, right or nearly, no prose."""
-    meant = _meant(name)
-    if note_of(name) is not None or meant is None:
-        return note_of(name) is not None
-    return _STATED[meant].fullmatch(value.strip().casefold()) is not None
-
-
 def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     """Return what a file says besides, by the names of `NOTES`; other notes are left out.
 
@@ -80,6 +72,22 @@ def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     return found
 
 
+def take_note(comment: str, notes: dict[str, str], where: str) -> bool:
+    """Add what a comment states to the notes; return whether it states anything.
+
+    Raises:
+        InputError: as `add_note`.
+    """
+    name, sign, value = comment.partition('=')
+    before, colon, behind = comment.partition(':')
+    # One nearly right is refused as with `=`; `Stiffness: see drawing` is prose.
+    if colon and _states(before, behind):
+        name, sign, value = before if note_of(before) else f'{before.strip()}:', colon, behind
+    if sign:
+        add_note(notes, name.strip(), value.strip(), where)
+    return bool(sign)
+
+
 def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
     """Add what a file says under a name; of names that are not understood the last counts.
 
@@ -89,6 +97,14 @@ def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
     if note_of(name) is not None and notes.get(name, value) != value:
         raise InputError(f'{where}: {name} is said twice, {notes[name]!r} and {value!r}; keep one')
     notes[name] = value
+
+
+def _states(name: str, value: str) -> bool:
+    """Return whether a name with its value behind a colon is a note, right or nearly, no prose."""
+    meant = _meant(name)
+    if note_of(name) is not None or meant is None:
+        return note_of(name) is not None
+    return _STATED[meant].fullmatch(value.strip().casefold()) is not None
 
 
 def _plain(name: str) -> str:

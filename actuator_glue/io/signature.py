@@ -42,7 +42,7 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
 )
 # Beginnings of text that is no table.
 _NO_TABLE = (
-    (re.compile(rb'\s*(\{\s*"|\[\s*[\[{])'), 'JSON'),
+    (re.compile(rb'\s*(\{\s*"|\[\s*[\[{]|\[\s*-?\d[\d.eE+-]*\s*,)'), 'JSON'),
     (re.compile(rb'\s*<(\?xml|!doctype|html|table)\b', re.IGNORECASE), 'XML or HTML'),
 )
 # A line of numbers alone: rows of a table, which may have a head of JSON or XML.

@@ -16,7 +16,7 @@ from actuator_glue.io.formats.delimited import (
     uncommented,
 )
 from actuator_glue.io.signature import open_text
-from actuator_glue.io.units import units_line
+from actuator_glue.io.units import kinds_line, units_line
 
 _LOOK = 300  # lines in which the samples must begin
 _ABOVE = 6  # lines above the samples in which their names and units are
@@ -99,7 +99,7 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
                 rows, follows, above = 0, True, []
             empty = 0
             text = uncommented(line.rstrip('\r\n'))
-            above = [*above[-1:], (at, fields_of(text, like.delimiter))]
+            above = [*above[-2:], (at, fields_of(text, like.delimiter))]
     if rows:
         found.append(SampleRows(first, rows))
     return found, follows
@@ -109,10 +109,12 @@ def _names_above(above: list[tuple[int, list[str]]]) -> int | None:
     """Return which line names the columns: the last one above the samples, or above their units.
 
     Args:
-        above: the last two lines above the samples that are not empty, with their positions.
+        above: the last three lines above the samples that are not empty, with their positions.
     """
-    if len(above) == 2 and units_line(above[1][1]):
-        (upper, names), (lower, units) = above
+    if len(above) == 3 and kinds_line(above[2][1]) and len(above[1][1]) == len(above[2][1]):
+        above = above[:2] if units_line(above[1][1]) else above
+    if len(above) >= 2 and units_line(above[-1][1]):
+        (upper, names), (lower, units) = above[-2:]
         if len(names) >= 2 and (lower == upper + 1 or len(names) == len(units)):
             return upper
     return above[-1][0] if above else None

@@ -314,6 +314,16 @@ def units_line(entries: list[str]) -> list[str]:
     return units if short and any(symbol(u) in known for u in units) else []
 
 
+def kinds_line(entries: list[str]) -> bool:
+    """Whether a line below the units says of what kind the samples are: `Smp`, `SR=100 Hz`.
+
+    Its words repeat, as names do not, and none is or begins with a number.
+    """
+    words = [entry for entry in entries if entry]
+    numbers = any(_is_number(word) or word[0].isdigit() for word in words)
+    return len(set(words)) < len(words) and not numbers
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text.replace(',', '.'))

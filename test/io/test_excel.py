@@ -83,6 +83,7 @@ def _sheets(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
 
 _ROWS = np.column_stack([SECONDS, COMMAND, MEASURED]).tolist()
 _RUN = [['time_s', 'command_mm', 'measured_mm'], *_ROWS]
+_MAPPED = (('time', 1, 's'), ('command', 2, 'mm'), ('measured', 3, 'mm'))
 _SUMMARY = [['Rate', 'Load'], [100, 2], [200, 5]]
 
 
@@ -123,12 +124,7 @@ def test_a_sheet_of_peaks_or_settings_is_no_record(tmp_path: Path, first: bool) 
     gains = [['gain', 'value', 'least', 'most'], *[[i, 1.0, 0.0, 2.0] for i in range(9)]]
     path = _sheets(tmp_path / 'a.xlsx', {'run': _RUN, 'gains': gains})
     mapped = tmp_path / 'map.yaml'
-    mapped.write_text(
-        '\n'.join(
-            f'{r}: {{column: {i}, unit: {u}}}'
-            for r, i, u in (('time', 1, 's'), ('command', 2, 'mm'), ('measured', 3, 'mm'))
-        )
-    )
+    mapped.write_text('\n'.join(f'{r}: {{column: {i}, unit: {u}}}' for r, i, u in _MAPPED))
     np.testing.assert_allclose(
         read(path, channels=mapped, warn=told.append).command, COMMAND * 1e-3
     )
@@ -150,3 +146,42 @@ def test_numbers_as_text_are_told(tmp_path: Path) -> None:
     rows = [[f'{v:.5f}' for v in row] for row in _ROWS]
     with pytest.raises(InputError, match='numbers that are kept as text are none'):
         read(_sheets(tmp_path / 'a.xlsx', {'run': [_RUN[0], *rows]}))
+
+
+@pytest.mark.parametrize('above', [['Rate', 100], ['Test 12 of 3 May']])
+def test_a_setting_names_no_column(tmp_path: Path, above: list[object]) -> None:
+    """The columns have numbers then, as those of texts; a map had `column: "100"`."""
+    path, out = _sheets(tmp_path / 'a.xlsx', {'run': [above, *_ROWS]}), tmp_path / 'map.yaml'
+    with pytest.raises(InputError, match='the columns are 1, 2, 3'):
+        read(path)
+    mapped = [f'{r}: {{column: {i}, unit: {u}}}' for r, i, u in _MAPPED]
+    out.write_text('\n'.join(mapped))
+    np.testing.assert_allclose(read(path, channels=out).command, COMMAND * 1e-3)
+
+
+def test_settings_above_the_names_are_stepped_over(tmp_path: Path) -> None:
+    """A row of numbers is no sample where there are names below it."""
+    head = [['Rate', 100], [1, 2, 3], _RUN[0]]
+    path = _sheets(tmp_path / 'a.xlsx', {'run': [*head, *_ROWS]})
+    np.testing.assert_allclose(read(path).command, COMMAND * 1e-3)
+
+
+def test_a_number_may_be_a_name(tmp_path: Path) -> None:
+    """Where each column has one."""
+    rows = [[*_RUN[0], 2024], *[[*row, 1.0] for row in _ROWS]]
+    np.testing.assert_allclose(
+        read(_sheets(tmp_path / 'a.xlsx', {'run': rows})).command, COMMAND * 1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    'head',
+    [
+        [['hold', 'linear'], ['Stiffness_N_per_m', 250e3], ['stiffness', 'of steel']],
+        [['# hold = linear'], ['# stiffness_N_per_m = 250e3'], ['Hold the piston = yes']],
+    ],
+)
+def test_notes_above_the_names_count(tmp_path: Path, head: list[list[object]]) -> None:
+    """They were passed over without a word; other settings stay the laboratory's own."""
+    record = read(_sheets(tmp_path / 'a.xlsx', {'run': [*head, _RUN[0], *_ROWS]}))
+    assert (record.hold, record.stiffness) == ('linear', 250e3)

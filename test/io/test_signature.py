@@ -64,6 +64,7 @@ def test_what_is_no_text_is_named(tmp_path: Path, content: bytes, name: str, suf
     ('content', 'name'),
     [
         ('{"time_s": [0.0, 0.1], "command_mm": [1.0, 2.0]}', 'JSON'),
+        ('[0.0, 1.0, 2.0]\n[0.1, -2.0, 1e-3]\n', 'JSON'),
         ('[{"time_s": 0.0, "command_mm": 1.0},\n {"time_s": 0.1, "command_mm": 2.0}]', 'JSON'),
         ('<?xml version="1.0"?>\n<Workbook>', 'XML'),
         ('\n<TABLE><tr><td>time_s</td></tr>', 'HTML'),

@@ -51,6 +51,52 @@ def test_lines_about_the_names_are_stepped_over(head: str, tmp_path: Path) -> No
     _check(_write(tmp_path / 'a.csv', head))
 
 
+@pytest.mark.parametrize(
+    'head',
+    [
+        'Time [s] Command [mm] Measured [mm] Force [N]',
+        '  Time (s)   Command (mm)   Measured (mm)   Force (N)',
+        '# Time (s) Command (mm)   Measured (mm) Force (N)',
+        '  Time  Command   Measured   Force  \n   s  mm  mm  N',
+    ],
+)
+def test_names_between_blanks_may_have_some(head: str, tmp_path: Path) -> None:
+    """`[s]` is no column of its own."""
+    path = _write(tmp_path / 'a.txt', head)
+    path.write_text(path.read_text().replace(',', ' '))
+    _check(path)
+
+
+def test_names_of_several_words_stand_apart_by_more_blanks(tmp_path: Path) -> None:
+    head = 'Running Time   Axial Command   Axial Disp   Axial Load\n sec  mm  mm  N'
+    path, out = _write(tmp_path / 'a.txt', head), tmp_path / 'map.yaml'
+    path.write_text(path.read_text().replace(',', '  '))
+    assert main(['map', str(path), '--out', str(out)]) == 0
+    assert 'CHECK unit' not in out.read_text()
+    _check(path, channels=out)
+
+
+def test_kinds_of_samples_below_the_units_are_stepped_over(tmp_path: Path) -> None:
+    """As data loggers write them."""
+    _check(_write(tmp_path / 'a.csv', f'{_BARE}\n{_UNITS}\nSmp,Smp,Smp,Smp'))
+    _check(_write(tmp_path / 'b.csv', f'{_BARE}\n{_UNITS}\n"","Smp","Smp","Smp"'))
+
+
+@pytest.mark.parametrize('row', ['0.0000,NA,NA,NA', 'NaN,NaN,NaN,NaN', 'Smp,A,B,C'])
+def test_what_may_be_a_sample_is_not_stepped_over(row: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'no number, in .* line 3'):
+        read(_write(tmp_path / 'a.csv', f'{_BARE}\n{_UNITS}\n{row}'))
+
+
+def test_exponents_of_fortran_are_numbers(tmp_path: Path) -> None:
+    path, out = _write(tmp_path / 'a.csv', _NAMES, form='{:.8E}'), tmp_path / 'map.yaml'
+    names, rows = path.read_text().split('\n', 1)
+    path.write_text(f'{names}\n{rows.replace("E", "D")}')
+    _check(path)
+    assert main(['map', str(path), '--out', str(out)]) == 0
+    _check(path, channels=out)
+
+
 def test_a_note_below_the_names_counts(tmp_path: Path) -> None:
     path = _write(tmp_path / 'a.csv', f'{_NAMES}\n# stiffness_N_per_m = 250e3')
     assert read(path).stiffness == 250e3
@@ -87,6 +133,8 @@ def test_numbers_of_samples_are_no_comments(tmp_path: Path) -> None:
     [
         'Channels: 4\nlength;x\nTime [s],Command [mm],Position [mm],Load [N]\n',
         'Logger 3\nTime,Command,Position,Load\n[s],[mm],[mm],[N]\n\n',
+        '"TOA5","CR6"\nTime,Command,Position,Load\n"s","mm","mm","N"\n"","Smp","Smp","Smp"',
+        f'T0=12.03.2024\n\nTime,Command,Position,Load\ns,mm,mm,N\n{",".join(["SR=500 Hz"] * 4)}',
         'Logger 3\nTime,Command,Position,Load\n\n[s],[mm],[mm],[N]\n',
         'Logger 3\nTime [s],"Command\n[mm]","Position\n[mm]","Load\n[N]"',
     ],

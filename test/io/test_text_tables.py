@@ -301,7 +301,7 @@ def test_a_delimiter_in_quotes_parts_no_name_either(tmp_path: Path) -> None:
 
 def test_of_names_with_blanks_between_blanks_a_map_is_told(tmp_path: Path) -> None:
     path = tmp_path / 'a.txt'
-    path.write_text('Time [s] Command [mm] Measured [mm]\n' + '0.1 1.5 2.5\n' * 9)
+    path.write_text('Time s Command mm Measured mm\n' + '0.1 1.5 2.5\n' * 9)
     with pytest.raises(InputError, match=r'6 names, but 3 entries.*--channels'):
         read(path)
 

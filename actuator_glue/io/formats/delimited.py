@@ -15,10 +15,10 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import add_note, note_of, states
+from actuator_glue.io.file_notes import take_note
 from actuator_glue.io.formats import Column, FileTable, Format
 from actuator_glue.io.signature import open_text
-from actuator_glue.io.units import EXAMPLE, bare, units_line
+from actuator_glue.io.units import EXAMPLE, bare, is_unit, kinds_line, units_line
 from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows read or written at a time
@@ -31,8 +31,9 @@ _BROKEN = 10  # lines over which the names may go on: spreadsheets break lines w
 DELIMITERS = (';', '\t', ',', '|')
 _NOTHING = ' \r\n\x1a'  # all that a line without entries may hold; DOS ends a file with the last
 _NUMBER = re.compile(
-    r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)', re.ASCII | re.IGNORECASE
+    r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?|nan|inf(?:inity)?)', re.ASCII | re.IGNORECASE
 )
+_FORTRAN = re.compile(r'(?<=[\d.])[dD](?=[+-]?\d)')  # the exponent of a double: 1.5D-3
 # Digits in groups of three, as thousands are written; a decimal fraction may look like it.
 _GROUPED = re.compile(r'[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+', re.ASCII)
 _MONTHS = ('jan', 'feb', 'mar', 'apr', 'may', 'jun', 'jul', 'aug', 'sep', 'oct', 'nov', 'dec')
@@ -135,8 +136,8 @@ def read_head(
         line = ' '.join(top[next(broken, max(header_lines - 1, 0)) : header_lines])
         line = uncommented(line)
         for above in filter(_COMMENT.match, top[:header_lines]):
-            _take_note(uncommented(above), notes, path)
-    below = header_lines
+            take_note(uncommented(above), notes, str(path))
+    below, by = header_lines, delimiter
     while line and not units and below < len(top):
         text, below = uncommented(top[below]), below + 1
         by = delimiter or _of_units(line, text)
@@ -145,10 +146,14 @@ def read_head(
         # A number behind a `#` may be that of a sample.
         row = len(entries) == len(fields_of(line, by)) and sum(map(is_number, entries)) > 1
         if units or (_COMMENT.match(top[below - 1]) and not row):
-            _take_note(text, notes, path)
+            take_note(text, notes, str(path))
             header_lines = below
         elif text.strip(_NOTHING):
             break
+    if units and header_lines < len(top):
+        kinds = fields_of(top[header_lines], by)
+        if len(kinds) == len(units) and kinds_line(kinds):
+            header_lines += 1
     rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
     if delimiter is None:
         delimiter = _best_delimiter(line, rows[0])
@@ -181,7 +186,7 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
     comments, at = [''], first
     while at < len(top) and (_COMMENT.match(top[at]) or not top[at].strip(_NOTHING)):
         comment = uncommented(top[at])
-        if comment.strip() and not _take_note(comment, notes, path):
+        if comment.strip() and not take_note(comment, notes, str(path)):
             comments.append(comment)
         at += 1
     line = '\n'.join(comments[-2:])
@@ -208,18 +213,6 @@ def _broken(lines: list[str]) -> bool:
     """
     odd = [line.count('"') % 2 for line in lines]
     return odd == [1, *[0] * (len(lines) - 2), 1] and _OPEN.search(lines[0]) is not None
-
-
-def _take_note(comment: str, notes: dict[str, str], path: Path) -> bool:
-    """Add what a comment states to the notes; return whether it states anything."""
-    name, sign, value = comment.partition('=')
-    before, colon, behind = comment.partition(':')
-    # One nearly right is refused as with `=`; `Stiffness: see drawing` is prose.
-    if colon and states(before, behind):
-        name, sign, value = before if note_of(before) else f'{before.strip()}:', colon, behind
-    if sign:
-        add_note(notes, name.strip(), value.strip(), str(path))
-    return bool(sign)
 
 
 def _commented_units(line: str) -> tuple[str, list[str]]:
@@ -256,7 +249,7 @@ def _of_units(names: str, units: str) -> str | None:
     for delimiter in DELIMITERS:
         if 1 < len(fields_of(names, delimiter)) == len(fields_of(units, delimiter)):
             return delimiter
-    return _best_delimiter(names, units)
+    return None if all(map(is_unit, units.split())) else _best_delimiter(names, units)
 
 
 def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
@@ -268,6 +261,10 @@ def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
         # As in `Position(8800 (0,1):Position) (mm)`, without quotes.
         whole = re.split(re.escape(delimiter) + r'(?![^()\[\]]*[)\]])', line)
         names = [name.strip() for name in whole] if len(whole) in widths else names
+    if len(names) > max(widths) and delimiter is None:
+        # Blanks within names, as in `Time [s]  Command [mm]`.
+        whole = [re.split(r'\s{2,}', line.strip()), re.split(r'\s+(?![\[(\s])', line.strip())]
+        names = next((found for found in whole if max(widths) - len(found) in (0, 1)), names)
     while len(names) > max(widths) and not names[-1]:
         names = names[:-1]
     return names
@@ -533,6 +530,7 @@ def _numbers(entries: list[str], decimal: Decimal) -> Array:
     text = '\n'.join(entries)
     if decimal == ',':  # a point makes the entry no number: dropping it would change the value
         text = text.replace('.', '?').replace(',', '.')
+    text = _FORTRAN.sub('e', text)
     entries = text.split('\n')
     if text.isascii() and '_' not in text:  # `float` accepts more than files mean
         try:

@@ -13,14 +13,15 @@ from array import array
 from collections.abc import Iterable
 from datetime import UTC, datetime, time, timedelta
 from functools import partial
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.file_notes import add_note, note_of, take_note
 from actuator_glue.io.formats import Column, FileTable, Format, library, reading
 from actuator_glue.io.units import bare, units_line
 from actuator_glue.records import Array
@@ -31,34 +32,36 @@ _SHARED = 64 << 20  # bytes of texts, which are kept in memory
 _HEAD = 50  # rows in which the names must be
 
 
+class _Sheet(NamedTuple):
+    """A sheet with numbers: the rows above its first sample, its columns, those of times."""
+
+    sheet: Any
+    above: list[tuple[Any, ...]]
+    columns: list[Column]
+    timed: set[int]
+
+
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     openpyxl = library('openpyxl', path)
     with reading(path, _NAME):
         _check(path)
         book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
         try:
-            found: list[tuple[Any, int, list[bool], list[Column]]] = []
-            for sheet in book.worksheets:
-                sheet.reset_dimensions()  # what the file claims may be wrong
-                head = list(islice(sheet.iter_rows(values_only=True), _HEAD))
-                lines = channels.header_lines if channels is not None else None
-                first = _first_sample(head) if lines is None else lines
-                if first is None or not any(_is_number(v) for row in head[first:] for v in row):
-                    continue
-                timed = _timed(head[first:])
-                columns = _columns(head, first, timed)
-                found.append((sheet, first, [i in timed for i in range(len(columns))], columns))
-            whole = [one for one in found if _holds(one[3], channels)]
+            found = [one for sheet in book.worksheets if (one := _sheet(sheet, channels))]
+            whole = [one for one in found if _holds(one.columns, channels)]
             if found:
-                sheet, skip, times, columns = (whole or found)[0]
-                rows = sheet.iter_rows(min_row=skip + 1, values_only=True)
-                table = _numbers(rows, times, skip, path)
+                chosen = (whole or found)[0]
+                columns, skip = chosen.columns, len(chosen.above)
+                rows = chosen.sheet.iter_rows(min_row=skip + 1, values_only=True)
+                table = _numbers(
+                    rows, [i in chosen.timed for i in range(len(columns))], skip, path
+                )
                 return FileTable(
                     columns,
-                    {},
+                    _notes(chosen.above, path),
                     partial(_chosen, table),
                     entry=partial(_place, skip, columns),
-                    told=_told([one[0].title for one in whole if _alike(one[3], columns)]),
+                    told=_told([one.sheet.title for one in whole if _alike(one.columns, columns)]),
                 )
         finally:
             book.close()
@@ -66,6 +69,18 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         f'{path}: no sheet with named columns of numbers in this workbook; numbers that are kept '
         'as text are none'
     )
+
+
+def _sheet(sheet: Any, channels: ChannelMap | None) -> _Sheet | None:
+    """Return what a sheet holds; None where it has no numbers."""
+    sheet.reset_dimensions()  # what the file claims may be wrong
+    head = list(islice(sheet.iter_rows(values_only=True), _HEAD))
+    lines = channels.header_lines if channels is not None else None
+    first = _first_sample(head) if lines is None else lines
+    if first is None or not any(_is_number(v) for row in head[first:] for v in row):
+        return None
+    timed = _timed(head[first:])
+    return _Sheet(sheet, head[:first], _columns(head, first, timed), timed)
 
 
 def _holds(columns: list[Column], channels: ChannelMap | None) -> bool:
@@ -113,11 +128,16 @@ def _is_time(value: Any) -> bool:
 
 
 def _first_sample(head: list[tuple[Any, ...]]) -> int | None:
-    """Return the row from 0 of the first sample: most of its cells are numbers or times."""
-    for i, row in enumerate(head):
+    """Return the row from 0 of the first sample: most of its cells are numbers or times.
+
+    The next row has numbers, too: below a row of settings there are names.
+    """
+    rows = [(i, row) for i, row in enumerate(head) if any(v is not None for v in row)]
+    for (i, row), (_, below) in zip_longest(rows, rows[1:], fillvalue=(0, (0.0,))):
         filled = [v for v in row if v is not None]
         numbers = sum(map(_is_number, filled))
-        if numbers and numbers + sum(map(_is_time, filled)) > max(len(filled) / 2, 1):
+        most = numbers + sum(map(_is_time, filled)) > max(len(filled) / 2, 1)
+        if numbers and most and any(map(_is_number, below)):
             return i
     return None
 
@@ -135,10 +155,13 @@ def _timed(rows: list[tuple[Any, ...]]) -> set[int]:
 def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[Column]:
     """Return the names above the first sample, with the units between where there are some."""
     texts = [[str(v).strip() if v is not None else '' for v in row] for row in head[:first]]
+    rows = [row for row, text in zip(head, texts, strict=False) if any(text)]
     above = [row for row in texts if any(row)][-2:]
     units: list[str] = []
     if len(above) == 2 and (found := units_line(above[1])):
         units, above = found, above[:1]
+    elif rows and _is_setting(rows[-1], head[first]):
+        above = []
     names = above[-1] if above else [str(i + 1) for i in range(len(head[first]))]
     if len(above) == 2 and sum(map(bool, above[0])) > 1:
         # A cell merged over both rows has its text in the upper one; a title stands alone.
@@ -150,6 +173,29 @@ def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[C
         Column(n, bare(n) if at in timed else n, 's' if at in timed else u)
         for at, (n, u) in enumerate(zip(names, units, strict=False))
     ]
+
+
+def _notes(rows: list[tuple[Any, ...]], path: Path) -> dict[str, str]:
+    """Return what stands above the names: `hold` and `linear` in two cells, or `# hold = linear`.
+
+    Other words than those of `NOTES` are the laboratory's own.
+    """
+    notes: dict[str, str] = {}
+    for row in rows:
+        filled = [str(v).strip() for v in row if v is not None]
+        if len(filled) == 2 and note_of(filled[0]):
+            add_note(notes, filled[0], filled[1], str(path))
+        elif len(filled) == 1 and filled[0].startswith('#'):
+            take_note(filled[0].lstrip('# '), notes, str(path))
+    return {name: value for name, value in notes.items() if note_of(name)}
+
+
+def _is_setting(row: tuple[Any, ...], sample: tuple[Any, ...]) -> bool:
+    """Whether a row above the first sample names no columns: `Rate`, 1000, or a title alone."""
+    filled = [v for v in row if v is not None]
+    return len(filled) < sum(v is not None for v in sample) and (
+        len(filled) == 1 or any(map(_is_number, filled))
+    )
 
 
 def _numbers(rows: Iterable[tuple[Any, ...]], timed: list[bool], skip: int, path: Path) -> Array:
