@@ -125,6 +125,11 @@ def read(
         raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():
         column.flags.writeable = False  # nobody else has them: the record need not copy them
+    if hold is None and said_hold not in (None, 'zoh', 'linear'):
+        raise InputError(
+            f'{path}: it says that its hold is {said_hold!r}; write zoh or linear there, or say '
+            'which with --hold or in a channel map'
+        )
     # Record refuses any other value.
     chosen = cast('Hold', hold or said_hold or 'zoh')
     return Record(

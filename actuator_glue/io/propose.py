@@ -10,8 +10,8 @@ import numpy as np
 
 from actuator_glue.even_times import uneven
 from actuator_glue.io.look import ColumnLook, FileLook
-from actuator_glue.io.units import OF_NO_LENGTH, ROLES, contradict, written_unit
-from actuator_glue.motion import MOTIONS
+from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES, contradict, written_unit
+from actuator_glue.motion import MOTIONS, TORQUES
 from actuator_glue.records import FASTEST_RATE, SLOWEST_RATE, Array
 from actuator_glue.velocity_command import is_velocity
 
@@ -322,8 +322,11 @@ def _with_force(chosen: dict[str, Guess], columns: list[ColumnLook]) -> dict[str
     named = [c for c in free if _called(c, 'force')]
     units = [c for c in free if c.unit in ROLES['force']]
     if len(named) == 1:
-        reason = f'called {named[0].label.strip()!r}'
-        return {**chosen, 'force': _guess(named[0], 'force', (reason,))}
+        column, reason = named[0], (f'called {named[0].label.strip()!r}',)
+        turns = 'measured' in chosen and chosen['measured'].unit in ANGLES
+        if turns and column.unit in TORQUES:
+            return {**chosen, 'force': Guess(column, column.unit, reason)}
+        return {**chosen, 'force': _guess(column, 'force', reason)}
     if len(units) == 1:
         return {**chosen, 'force': _guess(units[0], 'force', (f'its unit is {units[0].unit}',))}
     return chosen

@@ -87,6 +87,9 @@ _WORDS = {
     'milliamp': 'mA',
     'percent': '%',
     'count': 'counts',
+    'kip': 'kip',
+    'lbf': 'lbf',
+    'lbs': 'lbs',
     'newtonmeter': 'Nm',
     'newtonmetre': 'Nm',
     'sekunde': 's',
@@ -102,7 +105,19 @@ _ELSEWHERE = frozenset(
     ('foot', 'feet', 'ft', 'yard', 'mil', 'thou', 'km', 'kilometer', 'kilometre', 'nanometer')
 )
 _ELSEWHERE |= {'nanometre', 'lb', 'pound', 'kgf', 'dan', 'tonf', 'kg', 'kilogram', 'gram'}
-_ELSEWHERE |= {'minute', 'hour', 'day', 'ampere', 'amp', 'ohm', 'hertz', 'khz', 'pascal', 'kelvin'}
+_ELSEWHERE |= {
+    'min',
+    'minute',
+    'hour',
+    'day',
+    'ampere',
+    'amp',
+    'ohm',
+    'hertz',
+    'khz',
+    'pascal',
+    'kelvin',
+}
 _ELSEWHERE |= {'celsius', 'fahrenheit', 'microstrain', 'ustrain', 'strain', 'gal'}
 # Units that are words of other meanings too, where more words stand beside them.
 _EVERYDAY = frozenset(('in', 'g', 'bar', 'inc', 'rev', 'turn', 'turns', 'second', 'count', 'day'))
@@ -147,6 +162,12 @@ def factor(role: str, unit: str | None, where: str) -> float:
             'matter), or give the factor to one as `scale` in a channel map'
         )
     return known[unit]
+
+
+def _converts(role: str, unit: str) -> bool:
+    """Whether `of_file` accepts a unit."""
+    other = MOTIONS if role in _MOVING else TORQUES if role == 'force' else {}
+    return unit in ROLES[role] or unit in other
 
 
 def of_file(role: str, unit: str | None, where: str) -> float:
@@ -226,7 +247,7 @@ def written_unit(name: str) -> str:
     words = [w if w in _KNOWN else w.partition('/')[2] or w for w in words]
     # Within a name `in` and one letter may be anything.
     units = [w for w in words[:-1] if w in _KNOWN and len(w) > 1 and w != 'in']
-    units += [w for w in words[-1:] if w in _KNOWN]
+    units += [w for w in words[-1:] if w in _KNOWN or _elsewhere(w)]
     capitals = [w for w in words if w.isupper() and len(w) > 1 and w.lower() in _LOWER]
     found = (units or capitals or [str(text) for text in inside] or [''])[-1]
     return symbol(found) if is_unit(found) else found
@@ -348,21 +369,26 @@ def choose(
         InputError: a unit is missing, unknown or said twice differently, a role is there twice
             or a needed one not.
     """
+    called: dict[str, list[tuple[int, str]]] = {}
+    for position, name in enumerate(names):
+        role, unit = recognise(name) or ('', '')
+        if role:
+            called.setdefault(role, []).append((position, unit))
     found: dict[str, tuple[int, float]] = {}
     written: dict[str, str] = {}
-    for position, (name, stated) in enumerate(zip(names, units, strict=True)):
-        recognised = recognise(name)
-        if recognised is None:
-            continue
-        role, unit = recognised
-        if role in found:
-            first = names[found[role][0]].strip()
+    for role, columns in called.items():
+        # Beside `command_mm` another quantity is none: `command_velocity_mm_s`.
+        able = [(at, unit) for at, unit in columns if not unit or _converts(role, symbol(unit))]
+        (position, unit), *others = able or columns
+        name, stated = names[position].strip(), units[position]
+        if others:
             raise InputError(
-                f'{where}: two columns are called {role}, {first!r} and {name.strip()!r}; keep '
-                'one, or name the one that is meant in a channel map'
+                f'{where}: two columns are called {role}, {name!r} and '
+                f'{names[others[0][0]].strip()!r}; keep one, or name the one that is meant in a '
+                'channel map'
             )
         written[role] = symbol(unit or stated)
-        place = f'{where}: column {name.strip()!r}'
+        place = f'{where}: column {name!r}'
         if contradict(unit, stated):
             raise InputError(
                 f'{place} has unit {unit!r} in its name, and the file gives {stated!r} as its '

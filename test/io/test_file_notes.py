@@ -127,3 +127,11 @@ def test_beside_a_channel_map_nearly_right_is_prose(tmp_path: Path) -> None:
     path = text(tmp_path / 'a.csv', '# stiffness = 250e3', '# hold type: linear')
     record = read(path, channels=parse_channel_map(MAP | {'hold': 'zoh'}, 'a map'))
     assert (record.hold, record.stiffness) == ('zoh', None)
+
+
+def test_a_hold_that_is_none_is_told_with_what_to_do(tmp_path: Path) -> None:
+    path = text(tmp_path / 'a.csv', '# hold: foh')
+    with pytest.raises(InputError, match=r"a\.csv: it says that its hold is 'foh'; write zoh or"):
+        read(path)
+    assert read(path, hold='linear').hold == 'linear'
+    assert read(path, channels=parse_channel_map(MAP | {'hold': 'zoh'}, 'a map')).hold == 'zoh'

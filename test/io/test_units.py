@@ -11,7 +11,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.look import look
-from actuator_glue.io.units import contradict, recognise, symbol, written_unit
+from actuator_glue.io.units import ROLES, contradict, recognise, symbol, written_unit
 from actuator_glue.motion import MOTIONS
 
 COUNT = 1000
@@ -48,6 +48,8 @@ def test_every_way_to_write_a_unit(tmp_path: Path, form: str) -> None:
         ('Sollweg (mm) (gefiltert)', 'mm'),
         ('cmd_mm_filtered', 'mm'),
         ('Kraft F / kN', 'kN'),
+        ('command_ft', 'ft'),
+        ('time_min', 'min'),
         ('Velocity mm/s', 'mm/s'),
         ('Stroke [furlong]', 'furlong'),
         ('POS_MM', 'MM'),
@@ -290,3 +292,46 @@ def test_text_that_is_called_mat(tmp_path: Path) -> None:
     path = table(tmp_path / 'a.mat', ['time_s', 'command_mm', 'measured_mm'])
     with pytest.raises(InputError, match=r'this is text, not a MATLAB \.mat file; give it a name'):
         read(path)
+
+
+@pytest.mark.parametrize(
+    'other',
+    ['command_velocity_mm_s', 'measured_filtered_mm', 'command_mm/s', 'measured_ft', 'time_utc'],
+)
+@pytest.mark.parametrize('first', [False, True])
+def test_beside_a_channel_another_quantity_is_none(
+    tmp_path: Path, other: str, first: bool
+) -> None:
+    """Only the one with a unit that is understood can be meant."""
+    names, columns = ['time_s', 'command_mm', 'measured_mm'], [TIME, COMMAND, MEASURED]
+    at = 0 if first else 3
+    names.insert(at, other)
+    columns.insert(at, -TIME)
+    path = tmp_path / 'a.csv'
+    np.savetxt(path, np.column_stack(columns), '%.6f', ',', header=','.join(names), comments='')
+    record = read(path)
+    np.testing.assert_allclose(record.command, COMMAND * 1e-3, atol=1e-9)
+    np.testing.assert_allclose(record.measured, MEASURED * 1e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize('other', ['command', 'command_m', 'command_V'])
+def test_two_that_may_be_the_channel_are_refused(tmp_path: Path, other: str) -> None:
+    path = table(tmp_path / 'a.csv', ['time_s', 'command_mm', other])
+    with pytest.raises(InputError, match='two columns are called command'):
+        read(path)
+
+
+@pytest.mark.parametrize('unit', ['Kips', 'KIP', 'Lbf', 'kip', 'kips'])
+def test_units_of_force_in_any_capitals(unit: str) -> None:
+    """They can mean nothing else."""
+    assert ROLES['force'][symbol(unit)] > 4.0
+
+
+def test_the_torque_of_an_angle_is_proposed_as_one(tmp_path: Path) -> None:
+    """The proposed map said kN."""
+    path, out = tmp_path / 'a.csv', tmp_path / 'map.yaml'
+    table(path, ['time_s', 'command_deg', 'measured_deg'])
+    rows = [f'{line},{line.rpartition(",")[2]}' for line in path.read_text().splitlines()[1:]]
+    path.write_text('\n'.join(['time_s,command_deg,measured_deg,force_Nm', *rows]))
+    assert main(['map', str(path), '--out', str(out)]) == 0
+    np.testing.assert_allclose(read(path, channels=out).force, MEASURED, atol=1e-6)
