@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import is_bag
-from actuator_glue.io.bag_topics import TopicSeries, topic_series
+from actuator_glue.io.bag_topics import Stamps, TopicSeries, topic_series
 from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
 from actuator_glue.io.signature import refuse_pipe
@@ -122,7 +122,8 @@ def look(path: Path | str) -> FileLook:
 
 def _of_topic(topic: TopicSeries) -> list[ColumnLook]:
     stamped = min(topic.times['header']) > 0
-    times = topic.seconds('header' if stamped else 'published', 0)
+    kind: Stamps = 'header' if stamped else 'published'
+    times = topic.seconds(kind, topic.times[kind][0])
     alone = len(topic.columns) == 1
     return [
         ColumnLook(
@@ -130,7 +131,7 @@ def _of_topic(topic: TopicSeries) -> list[ColumnLook]:
             f'{topic.topic} {path}',
             '',
             np.array(values),
-            times - times[0],
+            times,
         )
         for path, values in topic.columns.items()
     ]

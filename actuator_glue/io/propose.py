@@ -37,6 +37,8 @@ _LATEST = 0.25  # s; no actuator follows later
 _DAY = 86_400.0  # s
 # Days since 1900, and since year 0, in this century.
 _DAYS = ((36_500.0, 73_100.0), (730_400.0, 767_100.0))
+# Strokes [m]: the longest, and one of which a thousandth is none of a servo-hydraulic test.
+_STROKE, _SHORT_STROKE = 2.0, 0.1
 _PAIRS = 100  # of columns that are looked at for a command of velocity
 
 
@@ -201,10 +203,7 @@ def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
         named = written_unit(column.label)
         doubt = f'unit: the name says {named!r}, and the file gives {column.unit!r}'
         return Guess(column, column.unit, reasons, (doubt,) * contradict(named, column.unit))
-    likeliest = {'time': 's', 'command': 'mm', 'measured': 'mm', 'force': 'kN'}[role]
-    if role == 'time' and column.steps is not None:
-        pace = float(column.steps.mean()) * SLOWEST_RATE
-        likeliest = next((u for u in ('s', 'ms', 'us') if pace * ROLES['time'][u] <= 1.0), 'ns')
+    likeliest = _likeliest(column, role)
     if role == 'time' and _counts_days(column):
         days = 'unit: days, as spreadsheets and MATLAB count them'
         return Guess(column, 's', reasons, (days,), scale=_DAY)
@@ -213,6 +212,23 @@ def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
     else:
         said = f'the file says {column.unit!r}: give {likeliest} per {column.unit} as `scale`'
     return Guess(column, likeliest, reasons, (f'unit: {said}',))
+
+
+def _likeliest(column: ColumnLook, role: str) -> str:
+    """Return the unit that a column without one has most often; metres where its stroke allows.
+
+    Messages of ROS are in SI units (REP 103).
+    """
+    message = column.times is not None
+    if role == 'force':
+        return 'N' if message else 'kN'
+    if role in ('command', 'measured'):
+        least, most = column.range()
+        return 'm' if most - least < (_STROKE if message else _SHORT_STROKE) else 'mm'
+    if column.steps is None:
+        return 's'
+    pace = float(column.steps.mean()) * SLOWEST_RATE
+    return next((u for u in ('s', 'ms', 'us') if pace * ROLES['time'][u] <= 1.0), 'ns')
 
 
 def _in_motion(guess: Guess, other: ColumnLook) -> Guess:

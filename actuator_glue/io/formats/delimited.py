@@ -263,8 +263,8 @@ def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
         names = [name.strip() for name in whole] if len(whole) in widths else names
     if len(names) > max(widths) and delimiter is None:
         # Blanks within names, as in `Time [s]  Command [mm]`.
-        whole = [re.split(r'\s{2,}', line.strip()), re.split(r'\s+(?![\[(\s])', line.strip())]
-        names = next((found for found in whole if max(widths) - len(found) in (0, 1)), names)
+        parted = [re.split(by, line.strip()) for by in (r'\s{2,}', r'\s+(?![\[(\s])')]
+        names = next((found for found in parted if max(widths) - len(found) in (0, 1)), names)
     while len(names) > max(widths) and not names[-1]:
         names = names[:-1]
     return names
