@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from actuator_glue.errors import InputError
 
@@ -70,6 +70,26 @@ def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
         if known is not None:
             add_note(found, known, value, where)
     return found
+
+
+def of_groups(groups: Iterable[Mapping[str, str]]) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Return what the groups of a file say alike, and a line for each of `NOTES` that differs.
+
+    Args:
+        groups: names and values; those that are not in `NOTES` are left out.
+    """
+    said: dict[str, set[str]] = {}
+    for group in groups:
+        for name, value in group.items():
+            if (known := note_of(name)) is not None:
+                said.setdefault(known, set()).add(value)
+    told = tuple(
+        f'its groups have different {name} ({", ".join(sorted(values))}), and none is taken; say '
+        'which in a channel map'
+        for name, values in said.items()
+        if len(values) > 1
+    )
+    return {name: min(values) for name, values in said.items() if len(values) == 1}, told
 
 
 def take_note(comment: str, notes: dict[str, str], where: str) -> bool:

@@ -52,6 +52,13 @@ def write_tdms(path: Path, *channels: tuple[str, np.ndarray, dict[str, object]])
     return path
 
 
+def in_hdf5(path: Path) -> Path:
+    """Write the same channels with their properties to HDF5, as npTDMS does."""
+    made = path.with_suffix('.h5')
+    with TdmsFile.read(path).as_hdf(made):
+        return made
+
+
 def later(samples: float) -> np.datetime64:
     """Start so many samples after the first one."""
     return START + np.timedelta64(round(samples * 1000), 'us')
@@ -82,6 +89,10 @@ def test_waveforms_of_tdms_are_aligned_by_their_starts(
     assert by_map.start_ns == record.start_ns
     shown = {column.label: column.values for column in look(path).columns}
     assert np.array_equal(1e-3 * shown['measured_mm'], record.measured)
+    same = read(in_hdf5(path))
+    assert np.array_equal(same.command, record.command)
+    assert np.array_equal(same.measured, record.measured)
+    assert (same.period, same.start_ns) == (record.period, record.start_ns)
 
 
 @pytest.mark.parametrize(
@@ -121,6 +132,20 @@ def parts(path: Path, *behind: float, period: float = 1e-3) -> Path:
                 ]
             )
     return path
+
+
+def test_properties_of_other_meanings_beside_hdf5_are_none(tmp_path: Path) -> None:
+    """What is no number, or no date, is no clock."""
+    path = tmp_path / 'a.h5'
+    with h5py.File(path, 'w') as file:
+        for name, values in (('time_s', TIME), ('command_mm', COMMAND), ('measured_mm', MEASURED)):
+            file[name] = values
+            file[name].attrs.update({'wf_increment': 'one', 'wf_start_time': 'noon'})
+    assert read(path).rate == pytest.approx(RATE)
+    with h5py.File(path, 'a') as file:
+        file['command_mm'].attrs['wf_increment'] = 2e-3
+    with pytest.raises(InputError, match='said to be 500 Hz, but by its column of times it is'):
+        read(path)
 
 
 def test_segments_of_tdms_that_go_on_are_one_record(tmp_path: Path) -> None:

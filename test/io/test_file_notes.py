@@ -5,6 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from nptdms import ChannelObject, GroupObject, TdmsWriter
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
@@ -135,3 +136,36 @@ def test_a_hold_that_is_none_is_told_with_what_to_do(tmp_path: Path) -> None:
         read(path)
     assert read(path, hold='linear').hold == 'linear'
     assert read(path, channels=parse_channel_map(MAP | {'hold': 'zoh'}, 'a map')).hold == 'zoh'
+
+
+def grouped(path: Path, *holds: str) -> Path:
+    """Write groups with attributes; the first one has the channels."""
+    with h5py.File(path, 'w') as file:
+        for number, hold in enumerate(holds):
+            group = file.create_group(f'run {number}')
+            group.attrs.update({'hold': hold, 'stiffness_N_per_m': 250e3, 'stiffness': 'of steel'})
+            for name, values in COLUMNS.items():
+                group[name if not number else f'old_{name}'] = values
+    return path
+
+
+def test_what_a_group_says_counts(tmp_path: Path) -> None:
+    """Only attributes of the file itself did: the hold was zoh without a word."""
+    record = read(grouped(tmp_path / 'a.h5', 'linear', 'linear'))
+    assert (record.hold, record.stiffness) == ('linear', 250e3)
+    path = tmp_path / 'a.tdms'
+    with TdmsWriter(str(path)) as file:
+        channels = [ChannelObject('g', name, values) for name, values in COLUMNS.items()]
+        said = GroupObject('g', properties={'hold': 'linear', 'stiffness_N_per_m': 250e3})
+        file.write_segment([said, *channels])
+    record = read(path)
+    assert (record.hold, record.stiffness) == ('linear', 250e3)
+
+
+def test_groups_that_differ_are_told(tmp_path: Path) -> None:
+    """The file is read; what counts only a person knows."""
+    told: list[str] = []
+    record = read(grouped(tmp_path / 'a.h5', 'linear', 'zoh'), warn=told.append)
+    assert (record.hold, record.stiffness) == ('zoh', 250e3)
+    (line,) = told
+    assert 'its groups have different hold (linear, zoh), and none is taken' in line

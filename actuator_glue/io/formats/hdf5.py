@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import NOTES, nearly
+from actuator_glue.io.file_notes import NOTES, nearly, note_of, of_groups
 from actuator_glue.io.formats import (
     A_REMARK,
     MOST_COLUMNS,
@@ -25,6 +26,13 @@ from actuator_glue.io.formats import (
     reading,
     scaling,
 )
+from actuator_glue.io.waveforms import (
+    PROPERTIES,
+    WaveformClock,
+    asked_for,
+    common_clock,
+    of_properties,
+)
 from actuator_glue.records import Array
 
 _MAGIC = b'\x89HDF\r\n\x1a\n'
@@ -36,7 +44,7 @@ _FIELDS = ('data', 'values', 'value')
 _NAMES = ('name', 'label')
 _NAME = 'an HDF5 file'
 _PACKING = ('scale_factor', 'add_offset')  # of netCDF, and applied
-_UNITS = ('unit', 'units', 'Unit', 'Units')
+_UNITS = ('unit', 'units', 'Unit', 'Units', 'unit_string')
 
 
 def is_hdf5(path: Path) -> bool:
@@ -49,11 +57,14 @@ def is_hdf5(path: Path) -> bool:
     return start.startswith(_MAGIC) or start[512:] == _MAGIC
 
 
-def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
+def read_tree(
+    path: Path, channels: ChannelMap | None = None, *, matlab: bool = False
+) -> FileTable:
     """Return the numeric datasets of a file as a table.
 
     Args:
         path: the file.
+        channels: a map that says which columns are asked for; None for those called by a role.
         matlab: names with dots, matrices turned as MATLAB has them; there may be objects alone,
             and no column.
 
@@ -66,15 +77,19 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
     def values(wanted: list[int]) -> list[Array]:
         with reading(path, _NAME), h5py.File(path, 'r') as file:
             chosen = [tree.places[at] for at in wanted]
-            return [_values(file[name], part, path) for name, part in chosen]
+            read = [_values(file[name], part, path) for name, part in chosen]
+        return [column[cuts.get(at, slice(None))] for at, column in zip(wanted, read, strict=True)]
 
     with reading(path, _NAME), h5py.File(path, 'r') as file:
-        tree.notes |= {n: _plain(v) for n, v in file.attrs.items() if nearly(n)}
         file.visititems(tree.visit)
+        notes, told = of_groups(tree.groups)
+        tree.notes = notes | tree.notes
+        tree.notes |= {n: _plain(file.attrs[n]) for n in file.attrs if nearly(n)}
     if not tree.columns and not matlab:
         raise InputError(f'{path}: no numeric vector or matrix in this file')
     columns = named_by_structs(tree.columns, tree.texts)
-    return FileTable(columns, tree.notes, values, unread=tree.unread)
+    cuts, period, start_ns = common_clock(tree.clocks, asked_for(columns, channels), path)
+    return FileTable(columns, tree.notes, values, period, start_ns, unread=tree.unread, told=told)
 
 
 def has_objects(path: Path) -> bool:
@@ -101,7 +116,9 @@ class _Tree:
     Attributes:
         columns: names of the columns of numbers.
         places: dataset of each column, and which column or field of that.
+        clocks: of each column, as npTDMS writes those of waveforms beside their samples.
         notes: what the file says besides.
+        groups: what each group and dataset says in its attributes.
         texts: small texts by their names in full.
         unread: columns of what is no number, by their label, and what they hold.
     """
@@ -110,13 +127,16 @@ class _Tree:
         self._matlab = matlab
         self.columns: list[Column] = []
         self.places: list[tuple[str, str | int]] = []
+        self.clocks: list[WaveformClock] = []
         self.notes: dict[str, str] = {}
+        self.groups: list[dict[str, str]] = []
         self.texts: dict[str, str] = {}
         self.unread: dict[str, str] = {}
         self._seen = 0
 
     def visit(self, name: str, found: Any) -> None:
         """Take what lies under a name; MATLAB's own group `#refs#` is left out."""
+        self.groups.append({n: _plain(found.attrs[n]) for n in found.attrs if note_of(n)})
         if not name.startswith('#') and hasattr(found, 'shape'):
             self._take(name, found, name.replace('/', '.') if self._matlab else name, 0)
 
@@ -141,12 +161,14 @@ class _Tree:
             said = scaling(dataset.attrs)
             self.columns += [Column(f'{shown}.{f}', f, '', said) for f in fields]
             self.places += [(place, f) for f in fields]
+            self.clocks += [_clock(f, dataset) for f in fields]
         elif dataset.dtype.kind in 'fiu' and not (_is_text(dataset) or _OBJECT in dataset.attrs):
             shape = dataset.shape[::-1] if self._matlab else dataset.shape
             said = scaling(dataset.attrs, _PACKING)
             found = matrix_columns(shown, shape, _unit(dataset), said)
             self.columns += found
             self.places += [(place, i) for i in range(len(found))]
+            self.clocks += [_clock(column.name, dataset) for column in found]
         elif dataset.size > A_REMARK and (fields or _CLASS not in dataset.attrs):
             self.unread[shown.replace('/', '.').rpartition('.')[2]] = _kind(dataset.dtype)
 
@@ -173,6 +195,19 @@ class _Tree:
                 continue
             for name, within in _datasets(target):
                 self._take(within.name, within, f'{called}.{name}', depth)
+
+
+def _clock(name: str, dataset: Any) -> WaveformClock:
+    """Return the clock of a column; properties of other kinds than npTDMS writes are none."""
+    said: dict[str, Any] = {}
+    for key in [key for key in PROPERTIES if key in dataset.attrs]:
+        value = dataset.attrs[key]
+        if key != 'wf_start_time':
+            said |= {key: value} if isinstance(value, (int, float, np.number)) else {}
+            continue
+        with suppress(ValueError):
+            said[key] = np.datetime64(_plain(value).removesuffix('Z'), 'us')
+    return of_properties(name, said, max(dataset.shape))
 
 
 def _kind(dtype: np.dtype[Any]) -> str:
@@ -287,7 +322,7 @@ def _unit(dataset: Any) -> str:
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
-    return read_tree(path)
+    return read_tree(path, channels)
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.file_notes import of_groups
 from actuator_glue.io.formats import (
     A_REMARK,
     Column,
@@ -22,12 +23,18 @@ from actuator_glue.io.formats import (
     reading,
     scaling,
 )
-from actuator_glue.io.units import bare, recognise
+from actuator_glue.io.units import bare
+from actuator_glue.io.waveforms import (
+    PROPERTIES,
+    WaveformClock,
+    asked_for,
+    common_clock,
+    of_properties,
+    start_ns_of,
+)
 from actuator_glue.records import Array, same_period
 
 _NAME = 'a LabVIEW TDMS file'
-# Starts that differ by whole samples, up to this share of a sample, are of one clock.
-_SAME = 0.02
 # A waveform goes on where a later segment begins this near its next sample: the computer stamps a
 # segment when it has it, by a clock of ticks of 15.6 ms, and late by what else it does: two ticks
 # and some milliseconds [s], or a sample late one time and early another [1]. A shorter gap cannot
@@ -36,20 +43,6 @@ _STAMPED, _STAMPED_SAMPLES = 0.04, 2.0
 _LATE_SAMPLES = 1.5
 # Computers and converters count seconds of their own, this far apart at most [1].
 _DRIFT = 5e-4
-_WAVE = ('wf_start_time', 'wf_start_offset', 'wf_increment')
-# LabVIEW's time zero: the start of a waveform that was given none.
-_UNKNOWN = np.datetime64('1904-01-01T00:00:00', 'us')
-
-
-@dataclass(frozen=True, slots=True)
-class _Clock:
-    """When the samples of a waveform were taken; `start_ns` is None where nobody says."""
-
-    name: str
-    period: float
-    offset: float
-    start_ns: int | None
-    length: int
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
@@ -60,13 +53,14 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     size = path.stat().st_size
     said = _said(path)
     columns: list[Column] = []
-    clocks: list[_Clock] = []
+    clocks: list[WaveformClock] = []
     broken: list[str] = []
     doubts: list[str] = []
     unread: dict[str, str] = {}
     stamps: set[int] = set()
     with reading(path, _NAME), tdms.open(path) as file:
-        notes = {str(name): str(value) for name, value in file.properties.items()}
+        notes, differ = of_groups(_texts(group.properties) for group in file.groups())
+        notes |= _texts(file.properties)
         for group in file.groups():
             for channel in group.channels():
                 if channel.data_type is None or not _is_number(channel):
@@ -91,11 +85,11 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                 doubts.append(doubt)
     if not columns:
         raise InputError(f'{path}: no channel of numbers in this TDMS file')
-    asked = _asked(columns, channels)
+    asked = asked_for(columns, channels)
     fault = next((broken[i] for i in asked if broken[i]), '')
     if fault:
         raise InputError(f'{path}: {fault}; save each part as a file of its own')
-    cuts, period, start_ns = _common(clocks, asked, path)
+    cuts, period, start_ns = common_clock(clocks, asked, path)
     if any(i in stamps for i in asked):
         start_ns = 0  # times of such a column are absolute
 
@@ -105,7 +99,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             read = [_values(found[columns[at].name], path) for at in wanted]
         return [column[cuts.get(at, slice(None))] for at, column in zip(wanted, read, strict=True)]
 
-    told = tuple(doubts[i] for i in asked if doubts[i])[:1]
+    told = (*differ, *[doubts[i] for i in asked if doubts[i]][:1])
     return FileTable(columns, notes, values, period, start_ns, unread=unread, told=told)
 
 
@@ -126,7 +120,7 @@ def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
 
         def _update_object_properties(self, properties: Any) -> None:
             for name, pairs in (properties or {}).items():
-                own = {key: value for key, value in pairs if key in _WAVE}
+                own = {key: value for key, value in pairs if key in PROPERTIES}
                 if own:
                     found.setdefault(name, []).append((self.before.get(name, 0), own))
             super()._update_object_properties(properties)
@@ -136,7 +130,9 @@ def _said(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
     return found
 
 
-def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock, str, str]:
+def _whole(
+    last: WaveformClock, said: list[tuple[int, dict[str, Any]]]
+) -> tuple[WaveformClock, str, str]:
     """Return the clock of a waveform from its first sample on, what breaks it, and what may.
 
     Args:
@@ -149,10 +145,10 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
     now: dict[str, Any] = {}
     for before, said_here in said:
         own = dict(said_here)
-        if 'wf_start_time' in now and _start_ns(own) is None:
+        if 'wf_start_time' in now and start_ns_of(own) is None:
             own.pop('wf_start_time', None)
         known, now = now, {**now, **own}
-        clock = _of_properties(last.name, now, last.length)
+        clock = of_properties(last.name, now, last.length)
         # What is said behind all samples, when a file is closed, is of all of them.
         if not known or not before or before >= last.length:
             first = previous = clock
@@ -191,7 +187,7 @@ def _whole(last: _Clock, said: list[tuple[int, dict[str, Any]]]) -> tuple[_Clock
     return first, '', _late_for_good(last, late_at)
 
 
-def _late_for_good(clock: _Clock, late_at: list[tuple[int, float]]) -> str:
+def _late_for_good(clock: WaveformClock, late_at: list[tuple[int, float]]) -> str:
     """Return in words where segments begin late, and all later ones too; nothing elsewhere.
 
     Stamps of a computer come late now and then; where samples are missing all later ones do, by
@@ -221,116 +217,19 @@ def _range(values: Array) -> Array:
     return np.array([np.minimum.accumulate(values), np.maximum.accumulate(values)])
 
 
-def _ahead(one: _Clock, other: _Clock) -> float:
+def _ahead(one: WaveformClock, other: WaveformClock) -> float:
     """Return how long after the first sample of a waveform that of another one was taken [s]."""
     passed = ((other.start_ns or 0) - (one.start_ns or 0)) * 1e-9
     return passed + other.offset - one.offset
 
 
-def _clock(channel: Any) -> _Clock:
+def _clock(channel: Any) -> WaveformClock:
     """Return the times of a channel, as LabVIEW's waveforms have them."""
-    return _of_properties(channel.name, channel.properties, len(channel))
+    return of_properties(channel.name, channel.properties, len(channel))
 
 
-def _of_properties(name: str, properties: Mapping[str, Any], length: int) -> _Clock:
-    period = float(properties.get('wf_increment', 0.0))
-    return _Clock(
-        name,
-        period if period > 0.0 else 0.0,
-        float(
-            np.nan_to_num(float(properties.get('wf_start_offset', 0.0)), posinf=0.0, neginf=0.0)
-        ),
-        _start_ns(properties),
-        length,
-    )
-
-
-def _start_ns(properties: Mapping[str, Any]) -> int | None:
-    """Return the start of a waveform [ns]; None where none is said, or LabVIEW's time zero."""
-    start: Any = properties.get('wf_start_time')
-    if hasattr(start, 'as_datetime64'):
-        start = start.as_datetime64('us')
-    known = isinstance(start, np.datetime64) and start != _UNKNOWN and not np.isnat(start)
-    return int(start.astype('datetime64[ns]').astype(np.int64)) if known else None
-
-
-def _one_clock(one: _Clock, other: _Clock) -> bool:
-    """Whether two waveforms have one period, and come to their end together as well."""
-    apart = abs(one.period - other.period) * min(one.length, other.length)
-    return same_period(one.period, other.period) and apart <= _SAME * one.period
-
-
-def _asked(columns: list[Column], channels: ChannelMap | None) -> list[int]:
-    """Return the positions of the columns that a map names, or that are called by their role."""
-    if channels is None:
-        return [i for i, column in enumerate(columns) if recognise(column.label)]
-    names = {channel.column for channel in channels.roles().values()}
-    return [i for i, c in enumerate(columns) if {c.name, c.label, i + 1} & names]
-
-
-def _common(
-    clocks: list[_Clock], asked: list[int], path: Path
-) -> tuple[dict[int, slice], float | None, int]:
-    """Return which samples of each waveform were taken together, their period and start [ns].
-
-    Raises:
-        InputError: columns that are asked for have other rates, or starts between the samples of
-            others, or were not taken at one time.
-    """
-    waveforms = [i for i, clock in enumerate(clocks) if clock.period]
-    group = [i for i in asked if i in waveforms]
-    if not group:
-        # No waveforms are asked for: take those of the most common period.
-        groups = [[j for j in waveforms if _one_clock(clocks[i], clocks[j])] for i in waveforms]
-        group = max(groups, key=len, default=[])
-    if not group:
-        return {}, None, 0
-    first = clocks[group[0]]
-    starts = [clock.start_ns for clock in clocks if clock.start_ns is not None]
-    zero = min(starts, default=0)
-
-    def ahead(clock: _Clock) -> float:
-        """Seconds from the file's first start to that of a waveform."""
-        own = zero if clock.start_ns is None else clock.start_ns
-        return (own - zero) * 1e-9 + clock.offset
-
-    latest = max(ahead(clocks[i]) for i in group)
-    cuts: dict[int, slice] = {}
-    faults = []
-    for i in group:
-        clock = clocks[i]
-        if not _one_clock(first, clock):
-            faults.append(
-                f'{first.name} has a sample every {first.period:.9g} s and {clock.name} one every '
-                f'{clock.period:.9g} s'
-            )
-            continue
-        late = (latest - ahead(clock)) / first.period
-        begin = round(late)
-        if abs(late - begin) > _SAME:
-            faults.append(
-                f'{clock.name} begins {latest - ahead(clock):.6g} s before another channel, which '
-                'is no whole number of samples'
-            )
-        if begin >= clock.length - 1:
-            faults.append(f'{clock.name} ends before another channel begins')
-        cuts[i] = slice(begin, None)
-    moved = any(cut.start for cut in cuts.values())
-    others = [clocks[i].name for i in asked if i not in group]
-    if moved and others:
-        faults.append(
-            f'{others[0]} has no start of its own, but those of the other channels differ'
-        )
-    if faults and asked:
-        raise InputError(
-            f'{path}: {faults[0]}; bring the channels to common times and save them again'
-        )
-    if faults:
-        return {}, None, 0
-    if moved:
-        stop = min(clocks[i].length - cut.start for i, cut in cuts.items())
-        cuts = {i: slice(cut.start, cut.start + stop) for i, cut in cuts.items()}
-    return cuts, first.period, max(zero + round(latest * 1e9), 0)
+def _texts(properties: Mapping[str, Any]) -> dict[str, str]:
+    return {str(name): str(value) for name, value in properties.items()}
 
 
 def _is_number(channel: Any) -> bool:
