@@ -10,7 +10,8 @@ from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.laboratory import read
-from actuator_glue.io.look import look
+from actuator_glue.io.look import ColumnLook, FileLook, look
+from actuator_glue.io.propose import propose
 from actuator_glue.io.units import ROLES, contradict, recognise, symbol, written_unit
 from actuator_glue.motion import MOTIONS
 
@@ -335,3 +336,25 @@ def test_the_torque_of_an_angle_is_proposed_as_one(tmp_path: Path) -> None:
     path.write_text('\n'.join(['time_s,command_deg,measured_deg,force_Nm', *rows]))
     assert main(['map', str(path), '--out', str(out)]) == 0
     np.testing.assert_allclose(read(path, channels=out).force, MEASURED, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('stroke', 'message', 'unit'),
+    [
+        (8e-3, False, 'm'),
+        (8.0, False, 'mm'),
+        (0.3, True, 'm'),
+        (80.0, True, 'mm'),
+    ],
+)
+def test_the_likeliest_unit_is_that_of_the_stroke(stroke: float, message: bool, unit: str) -> None:
+    """8 mm in metres were 8 um; messages of ROS are in metres where they can be. It is asked."""
+    times = TIME if message else None
+    columns = [
+        ColumnLook('command', 'command', '', stroke / 6.0 * COMMAND, times),
+        ColumnLook('measured', 'measured', '', stroke / 6.0 * MEASURED, times),
+    ]
+    found = propose(FileLook(Path('a'), columns, {}, 1e-3, 'made up'))
+    for role in ('command', 'measured'):
+        assert found.channels[role].unit == unit
+        assert 'the file states none' in found.channels[role].unsure[0]
