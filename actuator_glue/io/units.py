@@ -17,7 +17,7 @@ ROLES: dict[str, dict[str, float]] = {
     'time': _TIME,
     'command': LENGTH,
     'measured': LENGTH,
-    'force': FORCE,
+    'force': FORCE | {'lb': FORCE['lbf']},
 }
 # A float32 has no whole number between this one and the next but one.
 FLOAT32_COUNTS = 1 << 24
@@ -28,7 +28,7 @@ _RAW = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt
 _OTHERS = frozenset(('bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC'))
 _OTHERS |= {'m/s', 'mm/s', 'deg/s', 'rad/s', 'rpm', 'g', 'm/s2', 'm/s^2', 'm/s²', 'mm/s2', 'Hz'}
 # Units that no scale converts to a length.
-OF_NO_LENGTH = _OTHERS.union(FORCE, _TIME)
+OF_NO_LENGTH = _OTHERS.union(ROLES['force'], _TIME)
 _QUANTITY = {
     'time': 'time',
     'command': 'displacement',
@@ -89,7 +89,7 @@ _WORDS = {
     'count': 'counts',
     'kip': 'kip',
     'lbf': 'lbf',
-    'lbs': 'lbs',
+    'lb': 'lb',
     'newtonmeter': 'Nm',
     'newtonmetre': 'Nm',
     'sekunde': 's',
@@ -104,7 +104,7 @@ _WORDS = {
 _ELSEWHERE = frozenset(
     ('foot', 'feet', 'ft', 'yard', 'mil', 'thou', 'km', 'kilometer', 'kilometre', 'nanometer')
 )
-_ELSEWHERE |= {'nanometre', 'lb', 'pound', 'kgf', 'dan', 'tonf', 'kg', 'kilogram', 'gram'}
+_ELSEWHERE |= {'nanometre', 'pound', 'kgf', 'dan', 'tonf', 'kg', 'kilogram', 'gram'}
 _ELSEWHERE |= {
     'min',
     'minute',

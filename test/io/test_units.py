@@ -322,7 +322,7 @@ def test_two_that_may_be_the_channel_are_refused(tmp_path: Path, other: str) -> 
         read(path)
 
 
-@pytest.mark.parametrize('unit', ['Kips', 'KIP', 'Lbf', 'kip', 'kips'])
+@pytest.mark.parametrize('unit', ['Kips', 'KIP', 'Lbf', 'kip', 'kips', 'lb', 'Lbs'])
 def test_units_of_force_in_any_capitals(unit: str) -> None:
     """They can mean nothing else."""
     assert ROLES['force'][symbol(unit)] > 4.0
