@@ -40,6 +40,7 @@ _REST_SHARE = 0.1
 _OTHER_RATE = 1e-3
 # The end of `pos_m` or `cmd_in` may be no unit: whoever makes a channel map knows.
 _NO_UNIT = re.compile(r'_(?:\w|in)$')
+_ZARR = ('zarr.json', '.zgroup', '.zarray')  # files of a Zarr store, which is a folder
 _NEEDED = ('time', 'command', 'measured')
 
 
@@ -167,6 +168,8 @@ def channels_of(
     if not path.exists():
         raise InputError(f'{path}: there is no such file')
     refuse_pipe(path)
+    if path.is_dir() and any((path / name).exists() for name in _ZARR):
+        raise InputError(f'{path}: this is a Zarr store, which is not read; save HDF5 or .csv')
     if path.is_dir():
         raise InputError(f'{path}: this is a folder, and no bag in MCAP format; give its files')
     channels = channel_map_given(channels)

@@ -150,3 +150,11 @@ def test_messages_are_short_printable_and_survive_a_pipe() -> None:
     assert message.startswith('wrong: \\x1b[31m\\n\\x00')
     assert message.endswith(' do this')
     assert str(pickle.loads(pickle.dumps(error))) == message
+
+
+@pytest.mark.parametrize('name', ['zarr.json', '.zgroup'])
+def test_a_zarr_store_is_named(tmp_path: Path, name: str) -> None:
+    """Its files one by one are no records."""
+    (tmp_path / name).write_text('{}')
+    with pytest.raises(InputError, match='this is a Zarr store, which is not read; save HDF5 or'):
+        read(tmp_path)
