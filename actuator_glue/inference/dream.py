@@ -215,8 +215,8 @@ def sample(
     steps = (evaluations - state.evaluations) // n
     if steps < 2:
         raise InputError(
-            f'{evaluations} evaluations are used up by the start ({state.evaluations}); '
-            f'give at least {state.evaluations + n * (settings.adaptation + 100)}'
+            f'{evaluations} evaluations are used up by the start ({state.evaluations}), which is '
+            'cut where they end: give several times as many'
         )
     spent = state.evaluations
     draws = np.empty((steps, n, d))
