@@ -12,6 +12,7 @@ import two_sweeps
 
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.moves.move import AnswerMove, follow
+from actuator_glue.diagnosis.moves.registry import WITHIN
 from actuator_glue.diagnosis.selection import SearchStep
 
 WEIGHTS = {'light': -1, 'a': 1, 'b': 2, 'c': 1, 'd': 1}
@@ -110,3 +111,10 @@ def test_the_steps_of_a_search_lead_to_what_it_found() -> None:
     assert [s.parameters for s in steps] == [4, 5]
     assert steps[0].error > 1.3 * steps[1].error
     assert steps[1].error == pytest.approx(found.final.fit.rms, rel=1e-3)
+
+
+def test_what_is_known_already_is_tried_before_another_search() -> None:
+    """Effort that ended in the search for reserved effects left a known description untold."""
+    costly = 'effects reserved for the rest'
+    (group,) = (names for moves in WITHIN if costly in (names := [m.what for m in moves]))
+    assert group[-1] == costly

@@ -31,12 +31,13 @@ from actuator_glue.diagnosis.moves.move import (
     unexplained,
 )
 
-# Moves under one hold and one onset. A description may imitate names and settings.
+# Moves under one hold and one onset. A description may imitate names and settings; a search of
+# its own comes last, as none is begun once the effort is spent.
 WITHIN: Final[Groups] = (
     (
-        AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),
-        AnswerMove("one record's own setting", described, own_setting.own_setting),
         AnswerMove('learned terms', described, to(learned_terms.with_terms)),
+        AnswerMove("one record's own setting", described, own_setting.own_setting),
+        AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),
     ),
     (AnswerMove("the transducer's fault inside the loop", always, to(feedback.in_the_loop)),),
     (AnswerMove('learned terms', complete, to(learned_terms.with_terms), each_time=False),),
