@@ -81,7 +81,9 @@ def test_a_cubic_transducer_is_described(found: Diagnosis) -> None:
     (size,) = term.parameters.values()
     assert size.lower < 2e-4 / 2e-3**3 < size.upper
     assert size.unit == '1/m^2'
-    assert term.numbers == f'y = y + {size.mean:.4g}*y**3'
+    told = float(found.best[list(found.names).index('sensor_y3')])
+    assert term.best == {'sensor_y3': told}
+    assert term.numbers == f'y = y + {told:.4g}*y**3'  # whose error is told
     low, high = term.excited['y']
     assert -2.6e-3 < low < -1.8e-3 < 1.8e-3 < high < 2.6e-3
     assert f'a learned term learned-sensor-y3 ({term.numbers})' in found.summary()
@@ -153,7 +155,7 @@ def test_without_a_specimen_no_form_needs_its_force() -> None:
 
 def test_a_sentence_names_no_cause() -> None:
     """The range is that of the symbols in the equation."""
-    term = LearnedTerm('learned-x', 'sensor', 'y = y', 'y = y', {}, {'y': (-1e-3, 2e-3)}, {})
+    term = LearnedTerm('learned-x', 'sensor', 'y = y', 'y = y', {}, {}, {'y': (-1e-3, 2e-3)}, {})
     assert 'a description, not valid beyond y from -0.001 to 0.002 m' in term.sentence()
 
 

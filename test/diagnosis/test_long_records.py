@@ -10,8 +10,10 @@ from actuator_glue.diagnosis.posterior import posterior
 from actuator_glue.diagnosis.search import companions
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.telling import advice
+from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference import importance
+from actuator_glue.model.structure import Structure
 
 CUT = posterior._FEWEST  # evaluations
 
@@ -29,6 +31,32 @@ def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
     assert found.sampler['method'] == 'laplace'
     size = found.effects[0].parameters['deadband']
     assert size.lower < 2e-4 < size.upper and size.identified
+
+
+def test_a_companion_whose_chains_do_not_meet_opens_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is too small to matter: what the records fix without it stays fixed, and as it was."""
+    records = make(['valve-deadband'], [2e-4], 31)[1:2]
+    without = diagnose(records, seed=2, settings=Thresholds(evaluations=0))
+
+    def larger(beam: BeamSearch, final: Trial, least: float | None = None) -> Trial:
+        return final if least else beam.refits.additions(final, ['delay'])[0]
+
+    monkeypatch.setattr(companions, 'with_companions', larger)
+    drawn = posterior.sample
+
+    def apart(model: Structure, *args: Any, **options: Any) -> posterior.Draws:
+        draws = drawn(model, *args, **options)
+        unmet = (True,) * len(model.parameters)
+        return draws._replace(unmet=unmet) if 'delay' in model.effects else draws
+
+    monkeypatch.setattr(posterior, 'sample', apart)
+    found = diagnose(records, seed=2, settings=Thresholds(evaluations=0))
+    assert [e.name for e in found.effects] == ['valve-deadband']
+    before, after = (f.effects[0].parameters['deadband'] for f in (without, found))
+    assert before.identified and after.identified
+    assert after.upper - after.lower < 1.5 * (before.upper - before.lower)
 
 
 @pytest.mark.slow

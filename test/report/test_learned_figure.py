@@ -37,7 +37,7 @@ def found(*names: str, spread: float = 0.1) -> Any:
         definition = mapping([effect])[name]
         own: Any = dict.fromkeys(p.name for p in effect.parameters)
         terms.append(
-            LearnedTerm(name, effect.place, effect.equation, '', own, excited, definition)
+            LearnedTerm(name, effect.place, effect.equation, '', {}, own, excited, definition)
         )
     return SimpleNamespace(
         learned=tuple(terms),

@@ -28,7 +28,8 @@ class LearnedTerm:
         name: name of the effect.
         place: where in the loop it acts.
         equation: what it does to the signal there.
-        numbers: the equation with its parameters' means.
+        numbers: the equation with the best parameters, whose error is told.
+        best: these parameters [unit].
         parameters: posterior of its parameters.
         excited: range of everything in the equation that moved, about [unit of the symbol].
         definition: the effect as files of effects have it.
@@ -38,6 +39,7 @@ class LearnedTerm:
     place: str
     equation: str
     numbers: str
+    best: dict[str, float]
     parameters: dict[str, Estimate]
     excited: dict[str, tuple[float, float]]
     definition: Json
@@ -50,7 +52,7 @@ class LearnedTerm:
     def sentence(self) -> str:
         """Return equation, intervals and range in one sentence."""
         sizes = ', '.join(
-            f'{n} = {p.mean:.4g}{"" if p.unit == "1" else f" {p.unit}"}'
+            f'{n} = {self.best[n]:.4g}{"" if p.unit == "1" else f" {p.unit}"}'
             f' (95 % {p.lower:.4g} to {p.upper:.4g})'
             for n, p in self.parameters.items()
         )
@@ -70,6 +72,7 @@ class LearnedTerm:
             'place': self.place,
             'equation': self.equation,
             'expression': self.numbers,
+            'best': dict(self.best),
             'parameters': {name: p.to_json() for name, p in self.parameters.items()},
             'excited': {
                 s: {'lower': low, 'upper': high, 'unit': _UNITS[s]}
@@ -92,10 +95,11 @@ def described(
     trial: Trial, data: Data, estimates: Mapping[str, Estimate]
 ) -> tuple[LearnedTerm, ...]:
     """Return the learned terms of a structure."""
-    out = []
+    out, theta = [], dict(zip(trial.structure.names, map(float, trial.fit.theta), strict=True))
     for effect in trial.structure.entries:
         if is_learned(effect):
             own = {p.name: estimates[p.name] for p in effect.parameters}
+            best = {n: theta[n] for n in own}
             words = set(re.findall(r'[a-z_0-9]+', effect.equation))
             excited = {
                 s: (float(z.min()), float(z.max()))
@@ -104,16 +108,16 @@ def described(
             }
             out.append(
                 LearnedTerm(
-                    effect.name, effect.place, effect.equation, _numbers(effect.equation, own),
-                    own, excited, mapping([effect])[effect.name],
+                    effect.name, effect.place, effect.equation, _numbers(effect.equation, best),
+                    best, own, excited, mapping([effect])[effect.name],
                 )
             )  # fmt: skip
     return tuple(out)
 
 
-def _numbers(equation: str, parameters: Mapping[str, Estimate]) -> str:
-    for name, estimate in parameters.items():
-        equation = re.sub(rf'\b{name}\b', f'{estimate.mean:.4g}', equation)
+def _numbers(equation: str, best: Mapping[str, float]) -> str:
+    for name, value in best.items():
+        equation = re.sub(rf'\b{name}\b', f'{value:.4g}', equation)
     return equation.replace('+ -', '- ')
 
 

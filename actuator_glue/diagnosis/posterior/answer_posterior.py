@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.posterior import discrepancy, model_form, posterior, ridge
 from actuator_glue.diagnosis.posterior.mixed_draws import MixedDraws, mixed
 from actuator_glue.diagnosis.posterior.posterior import Draws
@@ -166,7 +167,9 @@ def sampled(
         result, before, after, draws, draws, MixedDraws.of(draws.points, final.effects), final,
         tied_structures(refits, found), rng,
     )  # fmt: skip
-    if decision.verdict in COMPLETE and not result.effort.over:
+    # Beside a description a companion would only correct its form.
+    named = not any_learned(final.structure)
+    if named and decision.verdict in COMPLETE and not result.effort.over:
         out = replace(out, larger=companions.with_companions(result.beam, final))
     # If chains converged in no parameter, there is no interval for companions or rivals to widen.
     if draws.unmet and all(draws.unmet):
@@ -174,13 +177,18 @@ def sampled(
     mixture = out.mixture
     if out.larger is not final:
         known = posterior.identified(out.space, draws.points, out.ridge).tolist()
-        draws = sample(out.larger, settings.evaluations)
-        mixture = MixedDraws.of(draws.points, out.larger.effects)
-        if like := companions.alike(result.beam, final, out.larger):
-            mixture = mixed(mixture, out.larger, like, laplace, rng)
-        draws = draws._replace(points=mixture.points)
-        draws = reduced(draws, out.larger, final, known)
-        mixture = replace(mixture, points=draws.points)
+        wider = sample(out.larger, settings.evaluations)
+        unmet = reduced(wider, out.larger, final, known).unmet
+        if any(k and u for k, u in zip(known, unmet, strict=True)):
+            # Chains that lose what the records fix say nothing of what is too small to matter.
+            out = replace(out, larger=final)
+        else:
+            mixture = MixedDraws.of(wider.points, out.larger.effects)
+            if like := companions.alike(result.beam, final, out.larger):
+                mixture = mixed(mixture, out.larger, like, laplace, rng)
+            wider = wider._replace(points=mixture.points)
+            draws = reduced(wider, out.larger, final, known)
+            mixture = replace(mixture, points=draws.points)
     return replace(
         out, with_companions=draws, mixture=mixed(mixture, final, out.rivals, laplace, rng)
     )
