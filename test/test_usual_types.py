@@ -317,6 +317,15 @@ def test_effects_are_read_from_and_written_to_any_path(tmp_path: Path) -> None:
         assert again.name == 'bent'
 
 
+def test_what_is_no_effect_and_no_specimen_is_refused() -> None:
+    """By name, before anything is asked of it."""
+    with pytest.raises(InputError, match="effect is 'bent'"):
+        api.effects.register('bent')  # type: ignore[arg-type]
+    one = [[1.0]]
+    with pytest.raises(InputError, match="specimen is 'steel'"):
+        api.Partition(one, one, one, 'steel', 1000.0)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize('given', [[2e-4], 2e-4, 'large'])
 def test_sizes_of_effects_are_given_by_parameter(given: Any) -> None:
     """Anything else is refused with the form that is meant."""

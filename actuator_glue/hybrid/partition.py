@@ -99,6 +99,7 @@ class Partition:
 
     def __post_init__(self) -> None:
         take_numbers(self)
+        of_kind(self.specimen, f'{self.name}: specimen', Specimen, 'a Specimen')
         for name in ('mass', 'damping', 'stiffness'):
             matrix = square(getattr(self, name), f'{self.name}: numerical {name}')
             object.__setattr__(self, name, matrix)

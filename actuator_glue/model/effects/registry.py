@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import of_kind
 from actuator_glue.model.effects import coefficients
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
@@ -30,9 +31,10 @@ class Registry(dict[str, Effect]):
             replace: take it in place of another one that was registered under its name.
 
         Raises:
-            InputError: its name or a parameter's belongs to another effect, or nothing uses a
-                parameter.
+            InputError: no effect, its name or a parameter's belongs to another effect, or nothing
+                uses a parameter.
         """
+        of_kind(effect, 'effect', Effect, 'what `term` makes')
         known = self.get(effect.name)
         if known is not None:
             if known == effect:
