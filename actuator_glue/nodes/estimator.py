@@ -16,12 +16,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.nodes import configuration, own_effects, spin, topics
-from actuator_glue.nodes.estimator_worker import (
-    Afterwards,
-    compute,
-    compute_beside,
-    warm_up,
-)
+from actuator_glue.nodes.estimator_worker import Afterwards, compute, compute_beside, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Latched, of_one_numbering
 from actuator_glue.nodes.messages import publish
@@ -175,7 +170,7 @@ class EstimatorNode(WorkingNode):
             elif isinstance(event, Restarted):
                 self.complain(event.reason, event.message)
             if isinstance(event, Restarted) and event.reason in ('setup', 'stream'):
-                self.channels = ChannelFault()  # others, maybe
+                self.channels = ChannelFault()  # channels of another sender, maybe
 
     def _say_unused(self) -> None:
         """Complain while the set-up that governs the present samples lets none be used."""

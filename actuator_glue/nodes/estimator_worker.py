@@ -111,9 +111,9 @@ def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tel
     # publishes nothing before the worker rests.
     tell(result)
     time.sleep(ON_THE_WAY)
-    stretch = job.window.stretch
-    found = None if stretch is None else fault(stretch)
-    return Afterwards(found, _tracked(result, deadline, frequencies))
+    # First what has a deadline.
+    tracked, stretch = _tracked(result, deadline, frequencies), job.window.stretch
+    return Afterwards(None if stretch is None else fault(stretch), tracked)
 
 
 def _tracked(

@@ -8,12 +8,20 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import check
+from actuator_glue.motion import spoken
 from actuator_glue.online.sensor_noise import white_noise
 from actuator_glue.online.window_posterior import EXCITATION
 from actuator_glue.records import Array, Record
 
 # Samples are joined to means over so long [s]: a stream of 20 kHz takes no longer than another.
 _MEANS = 1e-3
+# Range of a command that is a test [m]; the share of its standard deviation that each of so many
+# parts must have. In a file there is a whole test; in a stretch maybe a rest, a hold or the end of
+# a step, where a good sensor shows its last digit, or what was commanded before.
+_RANGE, _SHARE, _PARTS = 1e-4, 0.03, 5
+# How often a command must cross its mean, by half of its standard deviation either way, before a
+# force is judged: in a single stroke a drift is proportional to the displacement.
+_CROSSINGS = 4
 # Stretches in a row that must speak against the channels, before anything is said.
 _IN_A_ROW = 2
 
@@ -21,16 +29,30 @@ _IN_A_ROW = 2
 def fault(stretch: Record) -> str | None:
     """Return what speaks against the channels of a stretch; empty where nothing does.
 
-    None where it says nothing, because nothing moves: a stretch at rest is no test.
+    None where it says nothing, because the command does not move all the time.
     """
-    moved = float(stretch.command.std())
-    if moved == 0.0 or moved <= EXCITATION * white_noise(stretch.measured):
+    if not _moves(stretch.command):
         return None
+    told = stretch if _crossings(stretch.command) >= _CROSSINGS else replace(stretch, force=None)
     try:
-        check(replace(_coarser(stretch), source='the stream'))
+        check(replace(_coarser(told), source='the stream'))
     except InputError as error:
-        return str(error).removeprefix('the stream: ')
+        return spoken(str(error).removeprefix('the stream: '), stretch.motion)
     return ''
+
+
+def _moves(command: Array) -> bool:
+    """Whether a command moves in every part of a stretch, by more than noise."""
+    least = min(float(part.std()) for part in np.array_split(command, _PARTS) if len(part))
+    enough = max(_SHARE * float(command.std()), EXCITATION * white_noise(command))
+    return float(np.ptp(command)) >= _RANGE and least > enough
+
+
+def _crossings(command: Array) -> int:
+    """Return how often a command goes from one side of its mean to the other."""
+    off = command - command.mean()
+    sides = np.sign(off[np.abs(off) > 0.5 * off.std()])
+    return int(np.count_nonzero(np.diff(sides)))
 
 
 def _coarser(record: Record) -> Record:
