@@ -92,6 +92,7 @@ class Pacer:
             self._pace()
         except Exception as error:
             failure = error
+        self.behind = 0.0  # nothing is due any more
         if not self._stop.is_set():
             self._done(failure)
 
