@@ -230,6 +230,17 @@ class BagWriter:
                 self._put_aside()
                 raise
 
+    @property
+    def moved(self) -> bool:
+        """Whether the file being written is elsewhere by now; any thread may ask this."""
+        file = self._file
+        if file is None:
+            return False
+        try:
+            return not file.path.exists() and not file.removed
+        except (OSError, ValueError):  # a disk that says nothing, or a file closed meanwhile
+            return False
+
     def sync(self) -> None:
         """Wait until the disk has what was flushed; any thread may call this.
 

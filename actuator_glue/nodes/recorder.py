@@ -162,7 +162,7 @@ class RecorderNode(base.SuiteNode):
             self._brought_back = self.writer.brought_back
             text = f'a file of {self.writer.path} was deleted while it was recorded'
             self.complain('deleted', f'{text}; its messages are written anew', ERROR)
-        if not self.writer.path.is_dir():
+        if self.writer.moved:
             text = f'{self.writer.path} was moved: what comes is written to where it is now'
             self.complain('moved', f'{text}; move it back, or it stays unfinished', ERROR)
         if self._unsynced:

@@ -90,12 +90,27 @@ def test_what_is_deleted_while_it_is_written_is_brought_back(tmp_path: Path) -> 
         writer.add_topic('/test_setup', 'TestSetup')
         numbered(writer, range(100))
         shutil.rmtree(bag)
+        assert not writer.moved
         numbered(writer, range(100, 200))
         numbered(writer, range(200, 300))
         assert writer.brought_back == 1
         (bag / 'bag_1.mcap').unlink()
     assert [m.log_time for m in messages(bag)] == list(range(300))
     assert summarise(bag).finished and recover(bag).notes == []
+
+
+def test_what_is_moved_while_it_is_written_is_told_from_what_is_deleted(tmp_path: Path) -> None:
+    bag, away = tmp_path / 'bag', tmp_path / 'away'
+    with BagWriter(bag) as writer:
+        writer.add_topic('/test_setup', 'TestSetup')
+        numbered(writer, range(100))
+        bag.rename(away)
+        assert writer.moved
+        numbered(writer, range(100, 200))
+        away.rename(bag)
+        assert not writer.moved
+    assert not writer.moved and summarise(bag).finished
+    assert [m.log_time for m in messages(bag)] == list(range(200))
 
 
 def test_a_finished_file_that_is_deleted_is_said(tmp_path: Path) -> None:
