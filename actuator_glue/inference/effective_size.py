@@ -107,7 +107,8 @@ def _rounding(error: Array, command: Array, measured: Array) -> tuple[slice, flo
 def _period(command: Array) -> int:
     """Return the samples after which a command's end repeats what was before; 0 if it does not."""
     back, same = command[::-1], _SAME * float(np.ptp(command))
-    sizes = np.arange(1, len(back) // 2 + 1)
+    rest = int((np.abs(back - back[0]) > same).argmax())  # readings of a slow motion are alike
+    sizes = np.arange(rest + 1, len(back) // 2 + 1)
     for i in range(_SHORTEST):  # most are none by these alone
         sizes = sizes[np.abs(back[sizes + i] - back[i]) <= same] if len(sizes) else sizes
     for size in sizes:

@@ -133,6 +133,17 @@ def test_repeated_motion_counts_in_full_where_noise_does_not_repeat(step: float)
     assert effective_size(error, slopes, [(still, np.where(time < 20.0, read, 0.0))]) == plain
 
 
+def test_a_slow_command_that_is_rounded_repeats_as_well() -> None:
+    """Its last readings are alike, which is no period."""
+    time = np.arange(8000) / RATE
+    motion = 2e-3 * np.sin(0.2 * np.pi * time + 1.5)
+    read = 1e-5 * np.round(motion / 1e-5)
+    slopes, error = [np.stack([motion, np.gradient(motion)])], [read - motion]
+    known = effective_size(error, slopes, [(motion, read)])
+    assert known < 0.5 * effective_size(error, slopes)
+    assert effective_size(error, slopes, [(read, read)]) == pytest.approx(known, rel=1e-6)
+
+
 def held(seed: tuple[int, ...], phi: float, evaluations: int) -> np.ndarray:
     """Whether the 95 % intervals of a machine hold its parameters, (4,)."""
     rng = np.random.default_rng(seed)
