@@ -530,7 +530,10 @@ class Estimator:
         return [Failed(job.window.number, job.window.record.first_index, reason)]
 
     def _drop(self) -> Dropped:
+        """Drop the oldest of several windows; the next one keeps what shows the channels."""
         old = self._waiting.pop(0)
+        if old.stretch is not None:
+            self._waiting[0] = replace(self._waiting[0], stretch=old.stretch)
         return Dropped(old.number, old.record.first_index)
 
     def _judged(self, window: Window) -> tuple[FrozenPosterior, ...]:

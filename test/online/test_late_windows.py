@@ -25,6 +25,9 @@ def test_few_windows_wait_live():
     assert estimator.running is not None
     assert [w.number for w in estimator.waiting] == [9, 10, 11, 12]
     assert [e.number for e in events if isinstance(e, Dropped)] == list(range(1, 9))
+    # What window 6 would have shown of the channels is not lost with it.
+    stretches = [w.stretch for w in estimator.waiting]
+    assert [one and (one.first_index, len(one)) for one in stretches] == [(0, 1000), *3 * [None]]
     assert estimator.abandon('its process has died')[0].number == 0
     assert estimator.next_job().window.number == 9
 
