@@ -72,17 +72,26 @@ def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     return found
 
 
+def stated(notes: Mapping[str, str]) -> dict[str, str]:
+    """Return what notes of a laboratory's own say: a `hold` of `5 s` is that of a load."""
+    known = {name: note_of(name) for name in notes}
+    return {
+        name: notes[name]
+        for name, meant in known.items()
+        if meant is not None and (meant not in _STATED or _is_stated(meant, notes[name]))
+    }
+
+
 def of_groups(groups: Iterable[Mapping[str, str]]) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return what the groups of a file say alike, and a line for each of `NOTES` that differs.
 
     Args:
-        groups: names and values; those that are not in `NOTES` are left out.
+        groups: names and values; what `stated` leaves out is none.
     """
     said: dict[str, set[str]] = {}
     for group in groups:
-        for name, value in group.items():
-            if (known := note_of(name)) is not None:
-                said.setdefault(known, set()).add(value)
+        for name, value in stated(group).items():
+            said.setdefault(_PLAIN[_plain(name)], set()).add(value)
     told = tuple(
         f'its groups have different {name} ({", ".join(sorted(values))}), and none is taken; say '
         'which in a channel map'
@@ -124,6 +133,10 @@ def _states(name: str, value: str) -> bool:
     meant = _meant(name)
     if note_of(name) is not None or meant is None:
         return note_of(name) is not None
+    return _is_stated(meant, value)
+
+
+def _is_stated(meant: str, value: str) -> bool:
     return _STATED[meant].fullmatch(value.strip().casefold()) is not None
 
 

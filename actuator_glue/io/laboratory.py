@@ -17,7 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.given import of_kind
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
-from actuator_glue.io.file_notes import note_of, noted
+from actuator_glue.io.file_notes import noted, stated
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
@@ -268,7 +268,7 @@ def _mapped(
         if c.scale == 1.0 and c.offset == 0.0
     ]
     told = (*table.told, *_unlike_map(table, roles), *_unscaled(as_they_are))
-    notes = noted({n: v for n, v in table.notes.items() if note_of(n)}, str(path))
+    notes = noted(stated(table.notes), str(path))
     own = {
         'stiffness_N_per_m': channels.stiffness,
         'hold': channels.hold,

@@ -318,6 +318,9 @@ def _pair(
         if others:
             doubts.append(f'role: {", ".join(others)} may be it as well, by name')
         chosen[role] = _unsure(guess, tuple(doubts))
+    if not first.unit and not second.unit and {g.unit for g in chosen.values()} == {'m', 'mm'}:
+        # One moves a little further than the other.
+        chosen = {role: replace(guess, unit='mm') for role, guess in chosen.items()}
     doubts = []
     if abs(likeness) < _ALIKE:
         doubts.append(f'role: it is not like the command (correlation {likeness:.2f})')

@@ -105,20 +105,8 @@ _ELSEWHERE = frozenset(
     ('foot', 'feet', 'ft', 'yard', 'mil', 'thou', 'km', 'kilometer', 'kilometre', 'nanometer')
 )
 _ELSEWHERE |= {'nanometre', 'pound', 'kgf', 'dan', 'tonf', 'kg', 'kilogram', 'gram'}
-_ELSEWHERE |= {
-    'min',
-    'minute',
-    'hour',
-    'day',
-    'ampere',
-    'amp',
-    'ohm',
-    'hertz',
-    'khz',
-    'pascal',
-    'kelvin',
-}
-_ELSEWHERE |= {'celsius', 'fahrenheit', 'microstrain', 'ustrain', 'strain', 'gal'}
+_ELSEWHERE |= {'min', 'minute', 'hour', 'day', 'ampere', 'amp', 'ohm', 'hertz', 'khz', 'pascal'}
+_ELSEWHERE |= {'kelvin', 'celsius', 'fahrenheit', 'microstrain', 'ustrain', 'strain', 'gal'}
 # Units that are words of other meanings too, where more words stand beside them.
 _EVERYDAY = frozenset(('in', 'g', 'bar', 'inc', 'rev', 'turn', 'turns', 'second', 'count', 'day'))
 # What stands in the place of a unit and is none.

@@ -159,6 +159,13 @@ def test_a_setting_names_no_column(tmp_path: Path, above: list[object]) -> None:
     np.testing.assert_allclose(read(path, channels=out).command, COMMAND * 1e-3)
 
 
+def test_one_column_may_be_named_below_what_it_is_of(tmp_path: Path) -> None:
+    """A lone cell below names is no title."""
+    upper, lower = [*_RUN[0][:2], 'Specimen'], [None, None, _RUN[0][2]]
+    path = _sheets(tmp_path / 'a.xlsx', {'run': [upper, lower, *_ROWS]})
+    np.testing.assert_allclose(read(path).command, COMMAND * 1e-3)
+
+
 def test_settings_above_the_names_are_stepped_over(tmp_path: Path) -> None:
     """A row of numbers is no sample where there are names below it."""
     head = [['Rate', 100], [1, 2, 3], _RUN[0]]
@@ -179,6 +186,7 @@ def test_a_number_may_be_a_name(tmp_path: Path) -> None:
     [
         [['hold', 'linear'], ['Stiffness_N_per_m', 250e3], ['stiffness', 'of steel']],
         [['# hold = linear'], ['# stiffness_N_per_m = 250e3'], ['Hold the piston = yes']],
+        [['hold', 'linear'], ['Stiffness_N_per_m', 250e3], ['Hold', '5 s'], ['# hold: 5 s']],
     ],
 )
 def test_notes_above_the_names_count(tmp_path: Path, head: list[list[object]]) -> None:

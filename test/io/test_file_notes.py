@@ -130,6 +130,23 @@ def test_beside_a_channel_map_nearly_right_is_prose(tmp_path: Path) -> None:
     assert (record.hold, record.stiffness) == ('zoh', None)
 
 
+def test_beside_a_channel_map_the_hold_of_a_load_is_prose(tmp_path: Path) -> None:
+    path = text(tmp_path / 'a.csv', '# Hold: 5 s', '# Stiffness_N_per_m: see drawing')
+    record = read(path, channels=parse_channel_map(MAP, 'a map'))
+    assert (record.hold, record.stiffness) == ('zoh', None)
+    path = text(tmp_path / 'b.csv', '# hold: foh')
+    with pytest.raises(InputError, match="it says that its hold is 'foh'"):
+        read(path, channels=parse_channel_map(MAP, 'a map'))
+
+
+@pytest.mark.parametrize('holds', [('5.0',), ('5.0', '10.0')])
+def test_the_hold_of_a_load_in_a_group_is_none(tmp_path: Path, holds: tuple[str, ...]) -> None:
+    told: list[str] = []
+    record = read(grouped(tmp_path / 'a.h5', *holds), warn=told.append)
+    assert (record.hold, record.stiffness) == ('zoh', 250e3)
+    assert not told
+
+
 def test_a_hold_that_is_none_is_told_with_what_to_do(tmp_path: Path) -> None:
     path = text(tmp_path / 'a.csv', '# hold: foh')
     with pytest.raises(InputError, match=r"a\.csv: it says that its hold is 'foh'; write zoh or"):

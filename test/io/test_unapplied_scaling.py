@@ -76,7 +76,7 @@ def test_what_nobody_applies_is_told(tmp_path: Path, write: Writer, name: str) -
     [
         {'gain': 1.0, 'offset': 0.0},
         {'sensitivity': 12.5, 'range': 20.0, 'serial': 7},
-        {'scale': 'linear', 'gain_mode': 3.0, 'offset_nulling': 1.0},
+        {'scale': 'linear', 'gain_mode': 3.0, 'offset_nulling': 1.0, 'calibration': 2024},
     ],
 )
 def test_what_changes_nothing_is_not_told(tmp_path: Path, write: Writer, said: Said) -> None:

@@ -358,3 +358,13 @@ def test_the_likeliest_unit_is_that_of_the_stroke(stroke: float, message: bool, 
     for role in ('command', 'measured'):
         assert found.channels[role].unit == unit
         assert 'the file states none' in found.channels[role].unsure[0]
+
+
+def test_the_likeliest_unit_is_one_for_both() -> None:
+    """A command of 50 mm and back was in mm, and what followed it almost as far in m."""
+    columns = [
+        ColumnLook(name, name, '', values * 0.1 / float(np.ptp(COMMAND)))
+        for name, values in (('command', COMMAND), ('measured', 0.98 * MEASURED))
+    ]
+    found = propose(FileLook(Path('a'), columns, {}, 1e-3, 'made up'))
+    assert {found.channels[role].unit for role in ('command', 'measured')} == {'mm'}

@@ -30,7 +30,7 @@ A_REMARK = 20
 # Names of what numbers may have to be multiplied by, and of what may have to be added.
 _GAIN = re.compile(
     r'(?:(?:cal|calib|calibration|scal(?:e|ing)|conversion|channel)_?)?'
-    r'(?:gain|factor|scal(?:e|ing)|slope|multiplier|coefficient)|calibration(?:_constant)?'
+    r'(?:gain|factor|scal(?:e|ing)|slope|multiplier|coefficient)|calibration_constant'
 )
 _OFFSET = re.compile(r'(?:(?:add|cal|calibration|scal(?:e|ing)|channel)_?)?(?:offset|intercept)')
 # Columns that one file may have; a matrix with more is no list of channels.

@@ -21,7 +21,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import add_note, note_of, take_note
+from actuator_glue.io.file_notes import add_note, stated, take_note
 from actuator_glue.io.formats import Column, FileTable, Format, library, reading
 from actuator_glue.io.units import bare, units_line
 from actuator_glue.records import Array
@@ -160,11 +160,12 @@ def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[C
     units: list[str] = []
     if len(above) == 2 and (found := units_line(above[1])):
         units, above = found, above[:1]
-    elif rows and _is_setting(rows[-1], head[first]):
-        above = []
+    # A cell merged over both rows has its text in the upper one; a title stands alone.
+    merged = len(above) == 2 and sum(map(bool, above[0])) > 1
+    if not units and rows and _is_setting(rows[-1], head[first], alone=not merged):
+        above, merged = [], False
     names = above[-1] if above else [str(i + 1) for i in range(len(head[first]))]
-    if len(above) == 2 and sum(map(bool, above[0])) > 1:
-        # A cell merged over both rows has its text in the upper one; a title stands alone.
+    if merged:
         upper = [*above[0], *[''] * len(names)]
         names = [n or u for n, u in zip(names, upper, strict=False)]
     units += [''] * (len(names) - len(units))
@@ -183,18 +184,20 @@ def _notes(rows: list[tuple[Any, ...]], path: Path) -> dict[str, str]:
     notes: dict[str, str] = {}
     for row in rows:
         filled = [str(v).strip() for v in row if v is not None]
-        if len(filled) == 2 and note_of(filled[0]):
-            add_note(notes, filled[0], filled[1], str(path))
-        elif len(filled) == 1 and filled[0].startswith('#'):
-            take_note(filled[0].lstrip('# '), notes, str(path))
-    return {name: value for name, value in notes.items() if note_of(name)}
+        said = {filled[0]: filled[1]} if len(filled) == 2 else {}
+        if len(filled) == 1 and filled[0].startswith('#'):
+            take_note(filled[0].lstrip('# '), said, str(path))
+        for name, value in stated(said).items():
+            add_note(notes, name, value, str(path))
+    return notes
 
 
-def _is_setting(row: tuple[Any, ...], sample: tuple[Any, ...]) -> bool:
+def _is_setting(row: tuple[Any, ...], sample: tuple[Any, ...], *, alone: bool) -> bool:
     """Whether a row above the first sample names no columns: `Rate`, 1000, or a title alone."""
     filled = [v for v in row if v is not None]
+    title = alone and len(filled) == 1
     return len(filled) < sum(v is not None for v in sample) and (
-        len(filled) == 1 or any(map(_is_number, filled))
+        title or any(map(_is_number, filled))
     )
 
 
