@@ -159,11 +159,15 @@ def test_a_setting_names_no_column(tmp_path: Path, above: list[object]) -> None:
     np.testing.assert_allclose(read(path, channels=out).command, COMMAND * 1e-3)
 
 
-def test_one_column_may_be_named_below_what_it_is_of(tmp_path: Path) -> None:
-    """A lone cell below names is no title."""
-    upper, lower = [*_RUN[0][:2], 'Specimen'], [None, None, _RUN[0][2]]
-    path = _sheets(tmp_path / 'a.xlsx', {'run': [upper, lower, *_ROWS]})
-    np.testing.assert_allclose(read(path).command, COMMAND * 1e-3)
+@pytest.mark.parametrize('at', [0, 1, 2, 3])
+def test_one_column_may_be_named_below_what_it_is_of(tmp_path: Path, at: int) -> None:
+    """A lone cell below names is no title, and columns behind it keep their names."""
+    upper, lower = [*_RUN[0], 'force_kN'], [None] * 4
+    upper[at], lower[at] = 'Specimen', upper[at]
+    rows = [[*row, t] for row, t in zip(_ROWS, SECONDS, strict=True)]
+    record = read(_sheets(tmp_path / 'a.xlsx', {'run': [upper, lower, *rows]}))
+    np.testing.assert_allclose(record.command, COMMAND * 1e-3)
+    np.testing.assert_allclose(record.force, SECONDS * 1e3)
 
 
 def test_settings_above_the_names_are_stepped_over(tmp_path: Path) -> None:

@@ -166,8 +166,7 @@ def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[C
         above, merged = [], False
     names = above[-1] if above else [str(i + 1) for i in range(len(head[first]))]
     if merged:
-        upper = [*above[0], *[''] * len(names)]
-        names = [n or u for n, u in zip(names, upper, strict=False)]
+        names = [lower or upper for upper, lower in zip_longest(*above, fillvalue='')]
     units += [''] * (len(names) - len(units))
     # Dates and times of day are seconds, whatever their column is called.
     return [
