@@ -109,6 +109,7 @@ _ELSEWHERE |= {'min', 'minute', 'hour', 'day', 'ampere', 'amp', 'ohm', 'hertz', 
 _ELSEWHERE |= {'kelvin', 'celsius', 'fahrenheit', 'microstrain', 'ustrain', 'strain', 'gal'}
 # Units that are words of other meanings too, where more words stand beside them.
 _EVERYDAY = frozenset(('in', 'g', 'bar', 'inc', 'rev', 'turn', 'turns', 'second', 'count', 'day'))
+_EVERYDAY |= {'min', 'amp', 'mil', 'strain', 'foot', 'gal'}
 # What stands in the place of a unit and is none.
 _NONE = frozenset(
     ('', '1', '?', 'none', 'n/a', 'na', 'nan', 'null', 'nil', 'unknown', 'undefined')
@@ -235,7 +236,11 @@ def written_unit(name: str) -> str:
     words = [w if w in _KNOWN else w.partition('/')[2] or w for w in words]
     # Within a name `in` and one letter may be anything.
     units = [w for w in words[:-1] if w in _KNOWN and len(w) > 1 and w != 'in']
-    units += [w for w in words[-1:] if w in _KNOWN or _elsewhere(w)]
+    # `Load min` is the least one, `time_min` in minutes.
+    other = () if recognise(name) else _EVERYDAY
+    units += [
+        w for w in words[-1:] if w in _KNOWN or (_elsewhere(w) and w.casefold() not in other)
+    ]
     capitals = [w for w in words if w.isupper() and len(w) > 1 and w.lower() in _LOWER]
     found = (units or capitals or [str(text) for text in inside] or [''])[-1]
     return symbol(found) if is_unit(found) else found
