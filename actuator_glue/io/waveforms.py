@@ -24,6 +24,8 @@ PROPERTIES = ('wf_start_time', 'wf_start_offset', 'wf_increment')
 _SAME = 0.02
 # LabVIEW's time zero: the start of a waveform that was given none.
 _UNKNOWN = np.datetime64('1904-01-01T00:00:00', 'us')
+# LabVIEW's increment of a waveform that was given none [s]; no test is sampled so slowly.
+_DEFAULT = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +52,13 @@ def of_properties(name: str, properties: Mapping[str, Any], length: int) -> Wave
 
     Args:
         name: of its channel.
-        properties: of the channel, those of `PROPERTIES` among them; a period of 0 without one.
+        properties: of the channel, those of `PROPERTIES` among them; a period of 0 without an increment, or with LabVIEW's default.
         length: samples that it has.
     """
     period = float(properties.get('wf_increment', 0.0))
     return WaveformClock(
         name,
-        period if period > 0.0 else 0.0,
+        period if period > 0.0 and period != _DEFAULT else 0.0,
         float(
             np.nan_to_num(float(properties.get('wf_start_offset', 0.0)), posinf=0.0, neginf=0.0)
         ),

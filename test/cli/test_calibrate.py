@@ -141,8 +141,11 @@ def test_draws_are_drawn(run, short_bag: Path, tmp_path: Path) -> None:
     done = run('plot', short_bag, '--draws', draws, '--out', pictures)
     assert done.code == 0, done.err
     assert {p.name for p in pictures.iterdir()} == {'draws.png', 'bag.png', 'bag_bands.png'}
-    for wrong in (short_bag / 'metadata.yaml', tmp_path / 'nothing.npz'):
-        assert 'calibration' in run('plot', short_bag, '--draws', wrong).message
+    for wrong, said in (
+        (short_bag / 'metadata.yaml', 'calibration'),
+        (tmp_path / 'nothing.npz', 'there is no such file'),
+    ):
+        assert said in run('plot', short_bag, '--draws', wrong).message
 
 
 def test_one_free_test_leaves_parameters_to_the_prior(run, problem_r: Path) -> None:

@@ -235,6 +235,18 @@ def test_times_of_tdms_that_its_waveforms_contradict_are_refused(tmp_path: Path)
         read(path)
 
 
+def test_an_increment_that_nobody_gave_contradicts_no_times(tmp_path: Path) -> None:
+    """LabVIEW writes 1 s where none was set; in HDF5 that was made of the file as well."""
+    path = write_tdms(
+        tmp_path / 'a.tdms',
+        ('time_s', 2e-3 * np.arange(COUNT), {}),
+        ('command_mm', COMMAND, waveform(period=1.0)),
+        ('measured_mm', MEASURED, waveform(period=1.0)),
+    )
+    for one in (path, in_hdf5(path)):
+        assert read(one).period == 2e-3
+
+
 def test_waveforms_of_tdms_whose_increments_differ_in_their_last_digits(tmp_path: Path) -> None:
     """Increments that were divided by another number are one clock, asked for or not."""
     path = write_tdms(
