@@ -52,7 +52,8 @@ def of_properties(name: str, properties: Mapping[str, Any], length: int) -> Wave
 
     Args:
         name: of its channel.
-        properties: of the channel, those of `PROPERTIES` among them; a period of 0 without an increment, or with LabVIEW's default.
+        properties: of the channel, those of `PROPERTIES` among them; a period of 0 without an
+            increment, or with LabVIEW's default.
         length: samples that it has.
     """
     period = float(properties.get('wf_increment', 0.0))
