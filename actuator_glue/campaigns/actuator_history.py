@@ -23,8 +23,6 @@ from actuator_glue.given import number
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-# A day is an outlier where chance puts one of as many days so far out in one of 20 histories.
-_OUTLIERS = 0.05
 _MOST = 100.0  # logarithm: farther off is no number to be told
 
 
@@ -109,14 +107,13 @@ def _outliers(rows: list[dict[str, Any]], series: Series, together: Pooled) -> t
 
 def _far(series: Series, together: Pooled) -> list[str]:
     """Return for each day why it is far from its level; empty where it is not."""
-    limit = 1.0 - (1.0 - _OUTLIERS) ** (1.0 / len(series.days))
     found = left_out(series, together)
     told = []
-    for t, p_value in enumerate(found.together):
+    for t, outlier in enumerate(found.outliers):
         worst = int(np.argmin(found.p_values[t]))
         told.append(
             f'{series.names[worst]} {_off(float(found.deviation[t, worst]))} its level'
-            if p_value < limit
+            if outlier
             else ''
         )
     return told

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import expit
 from scipy.stats import chi2, norm
 
@@ -26,6 +27,8 @@ from actuator_glue.records import Array
 # Of two days nobody knows which is off; one of many hardly tells walk and offset, unless it is
 # farther off than this p-value says.
 _LEAST, _MANY, _DOUBTFUL = 3, 20, 0.05
+# Probability that a history has an outlier by chance, at most.
+_OUTLIERS = 0.05
 # Standard deviation of a day that tells nothing, and draws of walk and offset without a day.
 _NOTHING, _DRAWS = 1e6, 256
 _FREEDOM = 4  # of the offset's Student t
@@ -51,6 +54,11 @@ class LeftOut:
     def together(self) -> Array:
         """The p-value of each day, of all parameters together, (n,)."""
         return np.asarray(1.0 - (1.0 - self.p_values.min(axis=1)) ** self.p_values.shape[1])
+
+    @property
+    def outliers(self) -> NDArray[np.bool_]:
+        """Whether a day is so far off that chance puts one in one of 20 histories, (n,)."""
+        return np.asarray(self.together < 1.0 - (1.0 - _OUTLIERS) ** (1.0 / len(self.p_values)))
 
 
 def left_out(series: Series, together: Pooled) -> LeftOut:
