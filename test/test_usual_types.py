@@ -319,11 +319,12 @@ def test_effects_are_read_from_and_written_to_any_path(tmp_path: Path) -> None:
 
 def test_what_is_no_effect_and_no_specimen_is_refused() -> None:
     """By name, before anything is asked of it."""
+    effect: Any = 'bent'
     with pytest.raises(InputError, match="effect is 'bent'"):
-        api.effects.register('bent')  # type: ignore[arg-type]
-    one = [[1.0]]
-    with pytest.raises(InputError, match="specimen is 'steel'"):
-        api.Partition(one, one, one, 'steel', 1000.0)  # type: ignore[arg-type]
+        api.effects.register(effect)
+    one, specimen = np.eye(1), effect
+    with pytest.raises(InputError, match="specimen is 'bent'"):
+        api.Partition(one, one, one, specimen, 1000.0)
 
 
 @pytest.mark.parametrize('given', [[2e-4], 2e-4, 'large'])
