@@ -7,15 +7,12 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from actuator_glue import optional_library
 from actuator_glue.errors import InputError
@@ -27,12 +24,6 @@ from actuator_glue.records import Array
 LARGEST = 2 << 30
 # Values that are no numbers: so few are a remark, and no column.
 A_REMARK = 20
-# Names of what numbers may have to be multiplied by, and of what may have to be added.
-_GAIN = re.compile(
-    r'(?:(?:cal|calib|calibration|scal(?:e|ing)|conversion|channel)_?)?'
-    r'(?:gain|factor|scal(?:e|ing)|slope|multiplier|coefficient)|calibration_constant'
-)
-_OFFSET = re.compile(r'(?:(?:add|cal|calibration|scal(?:e|ing)|channel)_?)?(?:offset|intercept)')
 # Columns that one file may have; a matrix with more is no list of channels.
 MOST_COLUMNS = 10_000
 
@@ -45,8 +36,8 @@ class Column:
         name: in full, as a channel map calls it, e.g. `test.command_mm`.
         label: what it is called without the place where it lies, e.g. `command_mm`.
         unit: what the file gives as its unit beside the name; empty where it says nothing.
-        scaling: what the file says of a gain or an offset that is not applied, as `scaling` has
-            it; empty where it says nothing.
+        scaling: what the file says of a gain or an offset that is not applied
+            (unapplied_scaling.py); empty where it says nothing.
     """
 
     name: str
@@ -168,32 +159,6 @@ def check_size(size: int, path: Path) -> None:
             f'{path}: {size / 1e9:.3g} GB of numbers, {LARGEST / 1e9:.3g} GB at most are read; '
             'cut the record into parts'
         )
-
-
-def scaling(attributes: Mapping[str, Any], applied: tuple[str, ...] = ()) -> str:
-    """Return the gains and offsets, none of 1 and 0, that attributes of a channel say: `gain = 2`.
-
-    No convention tells whether the numbers have them already, so nobody applies them.
-
-    Args:
-        attributes: of the channel, by their names.
-        applied: names that the convention of a format defines.
-    """
-    found = []
-    for name in attributes:
-        if name in applied:
-            continue
-        plain = re.sub(r'[\s-]+', '_', name.strip()).casefold()
-        neutral = 1.0 if _GAIN.fullmatch(plain) else 0.0 if _OFFSET.fullmatch(plain) else None
-        if neutral is None or np.size(attributes[name]) != 1:
-            continue
-        try:
-            value = float(np.ravel(attributes[name])[0])
-        except (TypeError, ValueError):
-            continue
-        if np.isfinite(value) and value != neutral:
-            found.append(f'{name} = {value:g}')
-    return ', '.join(found)
 
 
 def matrix_columns(

@@ -24,8 +24,8 @@ from actuator_glue.io.formats import (
     matrix_column,
     matrix_columns,
     reading,
-    scaling,
 )
+from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.waveforms import (
     PROPERTIES,
     WaveformClock,

@@ -21,8 +21,8 @@ from actuator_glue.io.formats import (
     check_size,
     library,
     reading,
-    scaling,
 )
+from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.units import bare
 from actuator_glue.io.waveforms import (
     PROPERTIES,

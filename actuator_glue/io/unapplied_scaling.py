@@ -1,0 +1,42 @@
+"""Gains and offsets that a file states beside its numbers, and that nobody applies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+# Names of what numbers may have to be multiplied by, and of what may have to be added.
+_GAIN = re.compile(
+    r'(?:(?:cal|calib|calibration|scal(?:e|ing)|conversion|channel)_?)?'
+    r'(?:gain|factor|scal(?:e|ing)|slope|multiplier|coefficient)|calibration_constant'
+)
+_OFFSET = re.compile(r'(?:(?:add|cal|calibration|scal(?:e|ing)|channel)_?)?(?:offset|intercept)')
+
+
+def scaling(attributes: Mapping[str, Any], applied: tuple[str, ...] = ()) -> str:
+    """Return the gains and offsets, none of 1 and 0, that attributes of a channel say: `gain = 2`.
+
+    No convention tells whether the numbers have them already, so nobody applies them.
+
+    Args:
+        attributes: of the channel, by their names.
+        applied: names that the convention of a format defines.
+    """
+    found = []
+    for name in attributes:
+        if name in applied:
+            continue
+        plain = re.sub(r'[\s-]+', '_', name.strip()).casefold()
+        neutral = 1.0 if _GAIN.fullmatch(plain) else 0.0 if _OFFSET.fullmatch(plain) else None
+        if neutral is None or np.size(attributes[name]) != 1:
+            continue
+        try:
+            value = float(np.ravel(attributes[name])[0])
+        except (TypeError, ValueError):
+            continue
+        if np.isfinite(value) and value != neutral:
+            found.append(f'{name} = {value:g}')
+    return ', '.join(found)
