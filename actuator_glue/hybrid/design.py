@@ -11,6 +11,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.actuator import Actuator, actuator
 from actuator_glue.hybrid.compensator import HIGHEST, KINDS, LOWEST, Compensator, inverse
+from actuator_glue.hybrid.coupled import coupled
 from actuator_glue.hybrid.linear_system import System
 from actuator_glue.hybrid.loop import substructures
 from actuator_glue.hybrid.partition import Partition
@@ -71,8 +72,8 @@ class Loop:
 
     @cached_property
     def numerical(self) -> Numerical:
-        """The numerical substructure over one sample."""
-        return numerical(self.partition)
+        """What the actuator sees of the numerical substructure, over one sample."""
+        return numerical(coupled(self.partition))
 
     @cached_property
     def plants(self) -> Plants:

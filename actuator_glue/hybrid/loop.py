@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from actuator_glue.hybrid.coupled import coupled
 from actuator_glue.hybrid.linear_system import System
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.records import Array
@@ -15,12 +16,13 @@ def substructures(partition: Partition, specimen: Mapping[str, Array]) -> System
     """Return L(s) = H_N(s) G_E(s), from force to specimen force, one for each specimen.
 
     H_N is the receptance of the numerical substructure at the interface, G_E = m_e s^2 + c_e s +
-    k_e; D = m_e over the numerical mass at the interface.
+    k_e; D = m_e over the numerical mass at the interface. Only modes that the interface moves.
 
     Args:
         partition: the numerical substructure.
         specimen: mass, damping, stiffness, (m,) each.
     """
+    partition = coupled(partition)
     n, at = len(partition.mass), partition.interface
     inverse = inverted(partition.mass)
     A = states(inverse, partition.damping, partition.stiffness)

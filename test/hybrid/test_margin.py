@@ -5,6 +5,7 @@ import pytest
 
 from actuator_glue.api.frequency_response import Limits
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
+from actuator_glue.hybrid.coupled import coupled
 from actuator_glue.hybrid.linear_system import System, closed, crossings, held, series
 from actuator_glue.hybrid.margin import (
     classical_margins,
@@ -15,6 +16,7 @@ from actuator_glue.hybrid.margin import (
     sampled_delay_margin,
 )
 from actuator_glue.hybrid.partition import Partition, Specimen
+from actuator_glue.hybrid.watch import MarginWatch
 from actuator_glue.io.partition import read_partition
 from actuator_glue.model.benchmark_plant import BenchmarkParameters
 
@@ -26,6 +28,9 @@ BENCHMARK = (
     (8.726, 0.955, (3.612, 15.997, 38.086)),
 )
 STATIC_GAIN = 1.0261  # of the benchmark's plant
+STIFF = Specimen(0.0, 0.0, 250e3)
+NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
+THETA = np.array([[133.65, 1.1005e9, 2.4927e5, 0.006], [200.0, 1.1005e9, 2.4927e5, 0.006]])
 
 
 def sdof(damping: float, alpha: float, mass: float = 0.0, rate: float = 4096.0) -> Partition:
@@ -157,3 +162,73 @@ def test_a_held_force_may_spend_more_than_the_loop_bears(rate: float) -> None:
 def test_a_soft_specimen_bears_every_delay() -> None:
     """Where the gain is nowhere 1 nothing limits the delay."""
     assert pure_delay_margin(sdof(0.3, 0.1))[0] == np.inf
+
+
+def shaken(partition: Partition, seed: int, damping: float) -> Partition:
+    """The partition with a second structure that the interface neither moves nor feels.
+
+    Hidden: the other degrees of freedom are combinations of both structures'.
+    """
+    rng = np.random.default_rng(seed)
+    n, m = len(partition.mass), int(rng.integers(1, 4))
+    turn = np.eye(n + m)
+    turn[1:, 1:] = np.linalg.qr(rng.standard_normal((n + m - 1, n + m - 1)))[0]
+    mass, stiffness = np.diag(rng.uniform(300.0, 2e3, m)), np.diag(rng.uniform(0.0, 1e6, m))
+    if seed % 2:  # of one frequency
+        mass, stiffness = 1e3 * np.eye(m), 1e6 * np.eye(m)
+    beside = mass, 2.0 * damping * np.sqrt(mass * stiffness), stiffness
+    matrices = []
+    for own, other in zip(
+        (partition.mass, partition.damping, partition.stiffness), beside, strict=True
+    ):
+        both = turn @ np.block([[own, np.zeros((n, m))], [np.zeros((m, n)), other]]) @ turn.T
+        matrices.append(0.5 * (both + both.T))
+    return Partition(*matrices, partition.specimen, partition.rate)
+
+
+def storeys(seed: int, damping: float) -> Partition:
+    """Two to five storeys on springs; the actuator and the only damper are at the first."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 6))
+    k = rng.uniform(1e4, 1e6, n + 1)
+    stiffness = np.diag(k[:-1] + k[1:]) - np.diag(k[1:-1], 1) - np.diag(k[1:-1], -1)
+    only = np.zeros((n, n))
+    only[0, 0] = damping
+    mass = np.diag(rng.uniform(300.0, 2000.0, n))
+    return Partition(mass, only, stiffness, Specimen(0.0, 0.0, rng.uniform(1e4, 1e6)), 1000.0)
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_what_the_actuator_does_not_see_limits_nothing(seed: int) -> None:
+    """An undamped mode beside the loop gave 0.67 ms for 4.0, or no answer at all."""
+    for plain in (Partition([[1e3]], [[1e3]], [[1e5]], STIFF, 1000.0), storeys(seed, 1e3)):
+        for damping in (0.0, 1e-7):
+            both = shaken(plain, seed, damping)
+            assert pure_delay_margin(both) == pytest.approx(pure_delay_margin(plain), rel=1e-6)
+            told, expected = (MarginWatch(p).take(THETA, NAMES, (), 2.0) for p in (both, plain))
+            np.testing.assert_allclose(told.growth, expected.growth, rtol=1e-6)
+            np.testing.assert_allclose(told.margin, expected.margin, rtol=1e-3)
+
+
+def test_the_ground_moves_what_the_actuator_sees_as_before() -> None:
+    """The same modes, with the same participation."""
+    plain = storeys(3, 1e3)
+    seen, before = coupled(shaken(plain, 2, 0.0)), coupled(plain)
+    np.testing.assert_allclose(seen.natural_frequencies, plain.natural_frequencies, rtol=1e-6)
+    np.testing.assert_allclose(before.natural_frequencies, plain.natural_frequencies, rtol=1e-6)
+    for partition in (plain, before):
+        moved = partition.load @ np.linalg.solve(partition.whole[0], partition.load)
+        assert moved == pytest.approx(plain.whole[0].sum())
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_an_undamped_structure_that_is_coupled_bears_nothing(seed: int) -> None:
+    """However well the mode hides: the smallest delay makes it grow."""
+    assert pure_delay_margin(storeys(seed, 0.0))[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_the_held_force_takes_half_a_sample_of_hardly_damped_loops_too(seed: int) -> None:
+    """Resonances so sharp that rounding decided on which side of them the gain is one."""
+    continuous, sampled = pure_delay_margin(storeys(seed, 1e3))
+    assert sampled == pytest.approx(continuous - 0.5e-3, abs=1.5e-4)
