@@ -25,6 +25,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.moments import Moments
+from actuator_glue.io.bag_publishers import Publishers
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
 from actuator_glue.io.bag_records import check_order
 from actuator_glue.io.bag_samples import topics_of_actuator
@@ -113,6 +114,7 @@ class _Run:
     motion: str = METRES
     # Running indices of the first sample of each stretch without a gap, and of the one after it.
     stretches: list[tuple[int, int]] = field(default_factory=list)
+    publishers: Publishers = field(default_factory=Publishers)
     # The first set-up with a stiffness, or else the last one; and why one cannot be used.
     setup: StreamSetup | None = None
     refused: str = ''
@@ -122,6 +124,8 @@ class _Run:
         """Why there is no window at all, behind a colon; empty where no reason is known."""
         if not self.stretches:
             return ': it has no samples'
+        if self.publishers.told:
+            return f': {self.publishers.told}'
         give = 'give the specimen stiffness with --stiffness N/m, 0 for a free actuator'
         if self.setup is None:
             refused = f' that can be used ({self.refused})' if self.refused else ''
@@ -132,7 +136,10 @@ class _Run:
 
     def took(self, block: Block) -> None:
         """Count the samples of a block."""
-        self.data_seconds += _usable_seconds(block)
+        seconds = _usable_seconds(block)
+        self.data_seconds += seconds
+        if seconds:
+            self.publishers.take(block)
         first, stop = block.index, block.index + len(block)
         if self.stretches and self.stretches[-1][1] == first:
             first = self.stretches.pop()[0]
@@ -179,6 +186,8 @@ def replay(
     if not under_way.windows:
         reason = under_way.no_window
         raise InputError(f'{under_way.source}: not one window could be estimated{reason}')
+    if under_way.publishers.told:
+        under_way.notes.append(f'topic of the samples: {under_way.publishers.told}')
     return Replay(
         bag=under_way.source,
         settings={name: getattr(used, name) for name in OVERRIDES},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,6 +17,7 @@ from actuator_glue.clock_check import disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_samples
 from actuator_glue.io.bag_metadata import LATCHED
+from actuator_glue.io.bag_publishers import Publishers
 from actuator_glue.io.bag_reader import (
     TEST_SETUP,
     BagMessage,
@@ -136,7 +137,8 @@ def read_records(
         path: bag folder or lone .mcap.
         note: called with one line per damage; the default raises it.
         gap: called with one line where samples are missing or the clock jumps, and the test is
-            split there; the default raises. A new test or set-up splits without a word.
+            split there, and where publishers take turns, whose samples are left out; the default
+            raises. A new test or set-up splits without a word.
         warn: called with one line per set-up that cannot be used; the default is a Python
             warning.
 
@@ -145,21 +147,29 @@ def read_records(
             clock jump without `gap`.
     """
     every, setups = _setups(path, note, warn)
-    open_segments: dict[str, _Segment] = {}
+    open_segments: dict[str, _Segment | None] = {}
     done: list[_Segment] = []
-    for (topic, actuator, block), setup in _governed(path, every, setups):
+    publishers: dict[str, Publishers] = {}
+    for number, (topic, actuator, block), setup in _governed(path, every(), setups):
         segment = open_segments.get(topic)
+        fault = segment.fault_before(block) if segment is not None else ''
+        breaks = segment is not None and (fault != '' or block.index < segment.next_index)
+        if breaks and topic not in publishers:
+            publishers[topic] = _publishers(path, every(), topic)
+            if told := publishers[topic].told:
+                _tell(f'{path}: topic {topic}: {told}', gap, 'what they sent in turn is left out')
+        in_turn = topic in publishers and publishers[topic].in_turn(number)
+        if fault and not in_turn:
+            _tell(f'{path}: topic {topic}: {fault}', gap)
+        if segment is not None and (in_turn or fault or not segment.same_test(block, setup)):
+            done.append(segment)
+            segment = None
+        if segment is None and not in_turn:
+            segment = _Segment(topic, actuator, block, setup)
+        open_segments[topic] = segment
         if segment is not None:
-            fault = segment.fault_before(block)
-            if fault:
-                _tell(f'{path}: topic {topic}: {fault}', gap)
-            if fault or not segment.same_test(block, setup):
-                done.append(segment)
-                segment = None
-        if segment is None:
-            segment = open_segments[topic] = _Segment(topic, actuator, block, setup)
-        segment.append(block)
-    done.extend(open_segments.values())
+            segment.append(block)
+    done.extend(segment for segment in open_segments.values() if segment is not None)
     long_enough = [segment for segment in done if len(segment.command) >= 2]
     records = [
         segment.record(_source(path, segment.topic, len(open_segments), i, len(long_enough)))
@@ -170,10 +180,20 @@ def read_records(
     return records
 
 
-def _tell(fault: str, gap: Note | None) -> None:
+def _tell(fault: str, gap: Note | None, beside: str = '') -> None:
     if gap is None:
         raise InputError(f'{fault}; take the stretches as records of their own with --split')
-    gap(f'{fault}; the stretches are taken as records of their own')
+    apart = 'the stretches are taken as records of their own'
+    gap('; '.join(filter(None, (fault, beside, apart))))
+
+
+def _publishers(path: Path | str, every: Iterable[BagMessage], topic: str) -> Publishers:
+    """Return what all blocks of a topic say of its publishers."""
+    found = Publishers()
+    for raw in every:
+        if raw.topic == topic:
+            found.take(bag_samples.samples(raw, path).block)
+    return found
 
 
 def _source(path: Path | str, topic: str, topics: int, number: int, records: int) -> str:
@@ -193,16 +213,21 @@ def without_samples(path: Path | str) -> str:
 
 def _governed(
     path: Path | str, every: Iterable[BagMessage], setups: list[tuple[int, BagSetup]]
-) -> Iterator[tuple[BagBlock, StreamSetup | None]]:
-    """Yield all samples in their order, each block or part of a block with its set-up."""
+) -> Iterator[tuple[int, BagBlock, StreamSetup | None]]:
+    """Yield all samples in their order, each block or part of a block with its set-up.
+
+    Before each stands the number of the block, counted from 0 on its topic.
+    """
     governing: dict[str, _Governing] = {}
+    blocks: Counter[str] = Counter()
     for place, raw in enumerate(every):
         if raw.type == SAMPLE_BLOCK:
             found = bag_samples.samples(raw, path)
             if found.topic not in governing:
                 governing[found.topic] = _Governing(found.topic, setups)
             for block, setup in governing[found.topic].parts(found.block, place):
-                yield found._replace(block=block), setup
+                yield blocks[found.topic], found._replace(block=block), setup
+            blocks[found.topic] += 1
 
 
 def check_order(path: Path | str) -> None:
@@ -229,8 +254,8 @@ def check_order(path: Path | str) -> None:
 
 def _setups(
     path: Path | str, note: Note, warn: Note
-) -> tuple[Iterable[BagMessage], list[tuple[int, BagSetup]]]:
-    """Return all messages, and the usable set-ups with their place among them.
+) -> tuple[Callable[[], Iterable[BagMessage]], list[tuple[int, BagSetup]]]:
+    """Return what gives all messages, and the usable set-ups with their place among them.
 
     Checks the whole bag. A set-up that cannot be used is left out, as a live node leaves it out.
     Messages that a file holds in another order than that of their times are put in order.
@@ -241,8 +266,8 @@ def _setups(
     if order.mixed:
         every = sorted(again(), key=attrgetter('log_time'))
         if _counts_on(every, path):
-            return every, [*_usable(every, path, lambda _: None)]
-    return as_published(again()), setups
+            return lambda: every, [*_usable(every, path, lambda _: None)]
+    return lambda: as_published(again()), setups
 
 
 def _counts_on(every: Iterable[BagMessage], path: Path | str) -> bool:

@@ -17,6 +17,7 @@ from rclpy.time import Time
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import health, partners
+from actuator_glue.nodes.in_turn import InTurn
 from actuator_glue.nodes.now import begun, now_ns
 from actuator_glue.nodes.parameters import Parameters, Spec
 from actuator_glue.nodes.topics import DIAGNOSTICS, Topic
@@ -60,7 +61,7 @@ class SuiteNode(LifecycleNode):
         # An event without work, which returns a waiting executor to its loop.
         self.wake: Callable[[], None] = self.create_guard_condition(lambda: None).trigger
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._subscriptions_made: list[Any] = []
+        self._subscriptions_made: dict[Any, InTurn] = {}
         self._made: list[Any] = []
         self._undone: list[Callable[[], object]] = []
         self._timers_made: list[Any] = []
@@ -136,16 +137,25 @@ class SuiteNode(LifecycleNode):
             raw: do not decode.
             overrides: parameters override the QoS.
         """
-        call = self.guarded(callback)
+        call, senders = self.guarded(callback), InTurn()
+
+        def taken(data: Any, known: Any) -> None:
+            if not topic.shared:
+                senders.take(known)
+            if info:
+                call(data, known)
+            else:
+                call(data)
+
         made = self.create_subscription(
             topic.type,
             topic.name,
-            (lambda data, known: call(data, known)) if info else call,
+            taken,
             copy.copy(topic.qos),  # overriding writes into it
             raw=raw,
             qos_overriding_options=partners.OVERRIDES if overrides else None,
         )
-        self._subscriptions_made.append(made)
+        self._subscriptions_made[made] = senders
         return made
 
     @staticmethod
@@ -164,7 +174,7 @@ class SuiteNode(LifecycleNode):
 
     def unsubscribe(self, made: Any) -> None:
         """End a subscription before deactivation does."""
-        self._subscriptions_made.remove(made)
+        del self._subscriptions_made[made]
         self.destroy_subscription(made)
 
     def every(self, period: float, callback: Callable[[], None]) -> Any:
@@ -331,7 +341,10 @@ class SuiteNode(LifecycleNode):
         self._diagnostics.publish(message)
 
     def _check_partners(self) -> None:
-        """Report partners with which DDS will never exchange a message."""
+        """Report partners with which DDS will never exchange a message, and those in turn."""
+        for made, senders in self._subscriptions_made.items():
+            if told := senders.told(self, made.topic_name):
+                self.complain('publishers', told, health.ERROR)
         listening = (partners.unheard(self, made) for made in self._subscriptions_made)
         sending = (partners.unreached(self, made) for made in self._made)
         for kind, text in chain(*listening, *sending):

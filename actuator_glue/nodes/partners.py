@@ -48,12 +48,12 @@ def unheard(node: Any, subscription: Any) -> Iterator[tuple[str, str]]:
     wanted, topic = type_name(subscription.msg_type), subscription.topic_name
     for info in node.get_publishers_info_by_topic(topic):
         if info.topic_type != wanted:
-            text = f'{_name(info)} publishes {info.topic_type} on {topic}; {wanted} is expected'
+            text = f'{name(info)} publishes {info.topic_type} on {topic}; {wanted} is expected'
             yield 'wrong message type', text
             continue
         reason = refusal(subscription.qos_profile, info.qos_profile)
         if reason:
-            yield 'incompatible QoS', f'nothing is heard of {_name(info)} on {topic}: {reason}'
+            yield 'incompatible QoS', f'nothing is heard of {name(info)} on {topic}: {reason}'
 
 
 def unreached(node: Any, publisher: Any) -> Iterator[tuple[str, str]]:
@@ -61,9 +61,10 @@ def unreached(node: Any, publisher: Any) -> Iterator[tuple[str, str]]:
     for info in node.get_subscriptions_info_by_topic(publisher.topic_name):
         reason = refusal(info.qos_profile, publisher.qos_profile)
         if reason:
-            text = f'{_name(info)} gets nothing of {publisher.topic_name}: {reason}'
+            text = f'{name(info)} gets nothing of {publisher.topic_name}: {reason}'
             yield 'incompatible QoS', text
 
 
-def _name(info: Any) -> str:
+def name(info: Any) -> str:
+    """Return the full name of the node at one end of a topic."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'

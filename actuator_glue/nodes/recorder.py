@@ -207,7 +207,7 @@ class RecorderNode(base.SuiteNode):
                 self._wanted.discard(wanted)
                 qos = _suited(topics.SAMPLES.qos, self._offered(name, types[0]))
                 try:
-                    self._record(topics.Topic(wanted, _message(types[0]), qos))
+                    self._record(topics.Topic(wanted, _message(types[0]), qos, shared=True))
                 except (ImportError, AttributeError) as error:
                     self.complain('topic', f'{name}: type {types[0]} is not installed ({error})')
         for name, (topic, made) in list(self._heard.items()):

@@ -39,11 +39,13 @@ class Topic:
         name: relative name, to be remapped and put into namespaces.
         type: message class.
         qos: default profile of publishers and subscribers; parameters override it.
+        shared: several may publish it; else its messages count on from one another.
     """
 
     name: str
     type: Any
     qos: QoSProfile
+    shared: bool = False
 
     @property
     def latched(self) -> bool:
@@ -55,7 +57,7 @@ class Topic:
 SAMPLES = Topic('samples', SampleBlock, _reliable(2000))
 PREVIEW = Topic('command_preview', CommandPreview, _reliable(200))
 # Whoever joins late must know what is being tested and estimated.
-TEST_SETUP = Topic('test_setup', TestSetup, _reliable(10, latched=True))
+TEST_SETUP = Topic('test_setup', TestSetup, _reliable(10, latched=True), shared=True)
 ESTIMATOR_SETUP = Topic('estimator_setup', EstimatorSetup, _reliable(10, latched=True))
 DIAGNOSIS = Topic('diagnosis', Diagnosis, _reliable(1, latched=True))
 POSTERIOR = Topic('posterior', PosteriorMoments, _reliable(50))
@@ -68,7 +70,7 @@ TRACKING = Topic(
     'tracking', getattr(actuator_glue_msgs.msg, 'TrackingIndicators', None), _reliable(50)
 )
 _TRACKING = () if TRACKING.type is None else (TRACKING,)
-DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50))
+DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50), shared=True)
 
 # What the estimator says.
 ESTIMATED = (POSTERIOR, DRAWS, BAND, RESPONSE, *_TRACKING, ESTIMATOR_SETUP)
