@@ -72,7 +72,8 @@ def automatic(record: Record, model: ModelChoice, settle: int, near: Array | Non
         max_nfev=_ITERATIONS,
     )
     try:
-        return 0.5 * effective_size([best.fun], [slopes(best.x)])
+        moved = record.command[settle:], measured
+        return 0.5 * effective_size([best.fun], [slopes(best.x)], [moved])
     except InputError:
         # Nothing is left to explain: every sample counts.
         return 0.5 * len(measured)
