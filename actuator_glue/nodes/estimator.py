@@ -232,7 +232,8 @@ class EstimatorNode(WorkingNode):
         self.windows.add()
         actuator = result.window.record.actuator
         head, fields = conversion.posterior(result, seconds)
-        publish(self._out[topics.POSTERIOR], head, fields | trust(result, self.contradiction))
+        believed = trust(result, self.contradiction, self.channels)
+        publish(self._out[topics.POSTERIOR], head, fields | believed)
         publish(self._out[topics.DRAWS], *conversion.draws(result))
         for prediction in (*result.scored, *result.forecast):
             publish(self._out[topics.BAND], *conversion.prediction(prediction, actuator))

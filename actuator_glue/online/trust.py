@@ -8,11 +8,13 @@ import numpy as np
 
 from actuator_glue.model.linear import coefficients
 from actuator_glue.model.parameters import BASE
+from actuator_glue.online.channels import ChannelFault
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.stream import Contradicted, Window
 
 # As in PosteriorMoments.
 RATE_TOO_LOW, PRIOR_CONTRADICTED = 'rate-too-low', 'prior-contradicted'
+CHANNELS_WRONG = 'channels-wrong'
 # A later window agrees with its prior where its p-value is this large.
 _AGREES = 0.05
 
@@ -74,17 +76,25 @@ def _last_ns(window: Window) -> int:
     return window.record.stamp_ns(len(window.record) - 1)
 
 
-def doubts(result: WindowResult, contradiction: Contradiction) -> list[str]:
+def doubts(
+    result: WindowResult, contradiction: Contradiction, channels: ChannelFault
+) -> list[str]:
     """Return what speaks against a window's posterior, as in PosteriorMoments."""
-    found = [RATE_TOO_LOW] if sampled_too_slowly(result) else []
-    return found + [PRIOR_CONTRADICTED] * (contradiction.since_ns is not None)
+    found = {
+        RATE_TOO_LOW: sampled_too_slowly(result),
+        PRIOR_CONTRADICTED: contradiction.since_ns is not None,
+        CHANNELS_WRONG: channels.fault != '',
+    }
+    return [doubt for doubt, stands in found.items() if stands]
 
 
-def trust(result: WindowResult, contradiction: Contradiction) -> dict[str, object]:
+def trust(
+    result: WindowResult, contradiction: Contradiction, channels: ChannelFault
+) -> dict[str, object]:
     """Return the fields of a PosteriorMoments that say whether it can be believed."""
     found = result.conflict
     return {
-        'doubts': doubts(result, contradiction),
+        'doubts': doubts(result, contradiction, channels),
         'prior_p_value': math.nan if found is None else found.p_value,
         'prior_contradicted': contradiction.since_ns is not None,
         'contradicted_for': contradiction.lasted(result.window),

@@ -13,6 +13,7 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.model import linear
 from actuator_glue.model.commands import noise
 from actuator_glue.model.parameters import NAMES
+from actuator_glue.online.channels import ChannelFault
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import give, replay
@@ -38,8 +39,12 @@ def test_a_rate_far_too_low_for_the_loop_is_said(rate, too_low, stiffness):
     results = sampled(rate, stiffness)
     assert len(results) >= 3
     for result in results:
-        doubts = trust(result, Contradiction())['doubts']
+        doubts = trust(result, Contradiction(), ChannelFault())['doubts']
         assert doubts == (['rate-too-low'] if too_low else [])
+        wrong = ChannelFault()
+        for _ in range(2):
+            wrong.take('the channels are swapped')
+        assert trust(result, Contradiction(), wrong)['doubts'] == [*doubts, 'channels-wrong']
     if not too_low:
         k, (_, ab, a2, a3) = stiffness, THETA
         true = math.sqrt((THETA[0] * a3 * k + ab) / (k + a2)) / (2.0 * math.pi)
@@ -59,7 +64,7 @@ def test_an_alarm_stands_until_later_samples_agree():
             result = run(job)
             events = [e for e in estimator.finish(result) if isinstance(e, Contradicted)]
             contradiction.take(result, events)
-            shown.append((result, events, trust(result, contradiction)))
+            shown.append((result, events, trust(result, contradiction, ChannelFault())))
     first = next(n for n, (_, events, _) in enumerate(shown) if events)
     assert not any(told['prior_contradicted'] for _, _, told in shown[:first])
     result, (event,), told = shown[first]

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from actuator_glue_msgs.msg import PosteriorMoments
 from ros_nodes import QUICK, RATE
 
 from actuator_glue.model import linear
@@ -23,6 +24,10 @@ def motion(seconds):
 def test_a_sign_is_told_until_it_is_mended(start, probe):
     estimator = start('estimator', diagnostics_period=0.2, **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')
+    doubts = []
+    probe.create_subscription(
+        PosteriorMoments, 'posterior', lambda message: doubts.append(message.doubts), 50
+    )
     probe.open_stream()
     probe.setup()
     record = motion(30.0)
@@ -36,6 +41,7 @@ def test_a_sign_is_told_until_it_is_mended(start, probe):
 
     stream(11.0, -1.0)
     probe.until(lambda: TOLD in probe.faults['estimator'], what='complaint')
+    assert not doubts[0]
     stream(12.0, 1.0)
 
     def count():
@@ -46,4 +52,5 @@ def test_a_sign_is_told_until_it_is_mended(start, probe):
     before = count()
     probe.for_reports('estimator', 5)
     assert count() == before
+    assert ['channels-wrong'] in doubts and not doubts[-1]
     assert estimator.end() == 0, estimator.text
