@@ -124,10 +124,12 @@ class Parameters:
             )
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
             given = self._node._parameter_overrides.get(spec.name)
-            kind = type(spec.default).__name__
+            value, kind = None if given is None else given.value, type(spec.default)
+            whole = kind is float and type(value) is int
+            hint = f'write {value}.0, as ROS takes a number without a point for another type; '
             raise InputError(
-                f'parameter {spec.name} = {None if given is None else given.value!r} cannot be '
-                f'used: {spec.descriptor().description}, of type {kind} ({error})'
+                f'parameter {spec.name} = {value!r} cannot be used: {hint if whole else ""}'
+                f'{spec.descriptor().description}, of type {kind.__name__} ({error})'
             ) from error
 
     def _check_all(self, values: Mapping[str, Any]) -> None:

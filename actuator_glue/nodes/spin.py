@@ -16,6 +16,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.nodes import logs, transport
 from actuator_glue.nodes.base import ERROR, SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
+from actuator_glue.nodes.misspelt import misspelt
 from actuator_glue.nodes.signals import Stop
 
 # How long other nodes of a process go on after its stream has ended, for the last windows [s].
@@ -47,6 +48,8 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
         print(f'error: {error}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
+    for text in misspelt(nodes):
+        nodes[0].get_logger().warning(text)
     executor = Executor()
     for node in nodes:
         executor.add_node(node)
