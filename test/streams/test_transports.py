@@ -126,6 +126,7 @@ def test_a_line_without_end_ends_the_connection_only():
             hostile.sendall(b'9' * 100_000)
             assert counted(listener, 'malformed') == []
         assert listener.counts['malformed'] == 1 and len(listener._rest) == 0
+        assert 'end each with a line feed' in listener.hint
         thread = sent(at, terms(), record(50))
         assert len(joined(received(listener, 50))[0]) == 50
         thread.join(60.0)
@@ -263,6 +264,23 @@ def test_lines_with_another_number_of_entries_are_counted_and_give_no_sample():
     assert np.allclose(command, 1.5e-3) and np.allclose(measured, 1.25e-3)
     assert listener.counts['malformed'] == 40
     assert "b'" not in listener.hint and '4 entries in place of 3' in listener.hint
+
+
+@pytest.mark.parametrize('end', [b'\n', b'\r\n', b'\r', b'\n\n'])
+@pytest.mark.parametrize('size', [1, 7, 10_000])
+def test_lines_may_end_as_their_sender_ends_them(end, size):
+    """Cut anywhere on the way; with carriage returns alone nothing seemed to arrive."""
+    its = layout([{'name': 'counter', 'type': 'uint32'}, *PLAIN_PAIR], rate=500)
+    at = address('tcp')
+    with closing(listen(at, terms(its, 500.0))) as listener:
+        port = int(at.rpartition(':')[2])
+        with closing(socket.create_connection(('127.0.0.1', port))) as peer:
+            sent_whole = end.join(b'%d,1.5,1.25' % n for n in range(21)) + end
+            for start in range(0, len(sent_whole), size):
+                peer.sendall(sent_whole[start : start + size])
+            found = received(listener, 21, Reception(its, 500.0, in_order=True))
+    assert joined(found)[0].tolist() == list(range(21))
+    assert listener.counts['malformed'] == 0
 
 
 @pytest.mark.parametrize('channels', [1, 3])

@@ -63,9 +63,11 @@ class TcpListener:
             self._hang_up()
             return []
         self._heard = time.monotonic()
-        *lines, self._rest = (self._rest + data).split(b'\n')
+        # A carriage return ends a line, too: none is within one.
+        *lines, self._rest = (self._rest + data.replace(b'\r', b'\n')).split(b'\n')
         if len(self._rest) > LONGEST or any(len(line) > LONGEST for line in lines):
             self.counts['malformed'] += 1
+            self.hint = f'no line ends within {LONGEST} bytes; end each with a line feed'
             self._hang_up()
             return []
         return self._rows([line for line in lines if line.strip()])
