@@ -17,8 +17,8 @@ from rclpy.time import Time
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import health, partners
-from actuator_glue.nodes.in_turn import InTurn
 from actuator_glue.nodes.now import begun, now_ns
+from actuator_glue.nodes.numbering import Numbering
 from actuator_glue.nodes.parameters import Parameters, Spec
 from actuator_glue.nodes.topics import DIAGNOSTICS, Topic
 from actuator_glue.nodes.transitions import REACHED, answered
@@ -61,7 +61,8 @@ class SuiteNode(LifecycleNode):
         # An event without work, which returns a waiting executor to its loop.
         self.wake: Callable[[], None] = self.create_guard_condition(lambda: None).trigger
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._subscriptions_made: dict[Any, InTurn] = {}
+        self._subscriptions_made: dict[Any, Numbering] = {}
+        self._unreceived = 0
         self._made: list[Any] = []
         self._undone: list[Callable[[], object]] = []
         self._timers_made: list[Any] = []
@@ -137,11 +138,11 @@ class SuiteNode(LifecycleNode):
             raw: do not decode.
             overrides: parameters override the QoS.
         """
-        call, senders = self.guarded(callback), InTurn()
+        call, numbers = self.guarded(callback), Numbering()
 
         def taken(data: Any, known: Any) -> None:
             if not topic.shared:
-                senders.take(known)
+                numbers.take(known)
             if info:
                 call(data, known)
             else:
@@ -155,8 +156,13 @@ class SuiteNode(LifecycleNode):
             raw=raw,
             qos_overriding_options=partners.OVERRIDES if overrides else None,
         )
-        self._subscriptions_made[made] = senders
+        self._subscriptions_made[made] = numbers
         return made
+
+    @property
+    def unreceived(self) -> int:
+        """Number of messages that were sent to the subscriptions and did not arrive."""
+        return self._unreceived + sum(n.lost for n in self._subscriptions_made.values())
 
     @staticmethod
     def arrived(made: Any) -> Iterator[tuple[Any, Any]]:
@@ -174,7 +180,7 @@ class SuiteNode(LifecycleNode):
 
     def unsubscribe(self, made: Any) -> None:
         """End a subscription before deactivation does."""
-        del self._subscriptions_made[made]
+        self._unreceived += self._subscriptions_made.pop(made).lost
         self.destroy_subscription(made)
 
     def every(self, period: float, callback: Callable[[], None]) -> Any:
@@ -304,6 +310,7 @@ class SuiteNode(LifecycleNode):
                 self.destroy_subscription(subscription)
             self._timers_made.clear()
             self._subscriptions_made.clear()
+            self._unreceived = 0
 
     def at_cleanup(self, undo: Callable[[], object]) -> None:
         """Have cleanup call this to undo a part of do_configure; the last part goes first."""
@@ -342,9 +349,18 @@ class SuiteNode(LifecycleNode):
 
     def _check_partners(self) -> None:
         """Report partners with which DDS will never exchange a message, and those in turn."""
-        for made, senders in self._subscriptions_made.items():
-            if told := senders.told(self, made.topic_name):
+        for made, numbers in self._subscriptions_made.items():
+            if told := numbers.in_turn(self, made.topic_name):
                 self.complain('publishers', told, health.ERROR)
+        lost, told = self.unreceived, self.health.values.get('messages not received', 0)
+        if self._subscriptions_made:
+            self.health.values['messages not received'] = lost
+        if lost > told:
+            self.complain(
+                'not received',
+                f'{lost - told} messages that were sent did not reach this node: it, the computer '
+                'or the network is too slow; larger blocks are fewer messages',
+            )
         listening = (partners.unheard(self, made) for made in self._subscriptions_made)
         sending = (partners.unreached(self, made) for made in self._made)
         for kind, text in chain(*listening, *sending):

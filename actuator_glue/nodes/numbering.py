@@ -1,4 +1,4 @@
-"""Whether several nodes publish one topic in turn, told by the numbers of what they send."""
+"""What the numbers of arriving messages tell: lost ones, and publishers that take turns."""
 
 from __future__ import annotations
 
@@ -8,33 +8,54 @@ from typing import Any
 
 from actuator_glue.nodes import partners
 
-# A node that is started again counts from 1 again, once; so often within so long [s] none does.
+# A node that is started again takes over once or, with what was on its way, twice; nobody takes
+# turns so often within so long [s].
 _SURE, _WITHIN = 3, 10.0
+# Publishers whose numbers may go on.
+_OPEN = 8
 
 
-class InTurn:
-    """Watches what arrives at a subscription.
+class Numbering:
+    """Watches what arrives at a subscription: each publisher numbers its messages.
 
-    Each publisher numbers its messages: where two send in turn, the numbers go back again and
-    again. That two are known says nothing: one may be inactive, or was killed and is still known.
+    Where two send in turn, the numbers of the one go on after those of the other. That two are
+    known says nothing: one may be inactive, or was killed and is still known.
+
+    Attributes:
+        lost: messages that were sent and did not arrive, since the first that did.
     """
 
     def __init__(self) -> None:
-        self._last = 0
-        self._back: deque[float] = deque(maxlen=_SURE)
+        self.lost = 0
+        # The last number of each publisher, of whom sent last at the end.
+        self._last: list[int] = []
+        self._jump = 0, 0
+        self._turns: deque[float] = deque(maxlen=_SURE)
 
     def take(self, info: Any) -> None:
         """Take what the middleware knows of a message; some number none."""
         number = info.get('publication_sequence_number')
         if number is None:
             return
-        if number <= self._last:
-            self._back.append(time.monotonic())
-        self._last = number
+        left, reached = self._jump
+        if left < number < reached:
+            # What seemed lost comes: the jump was to the numbers of another publisher.
+            self.lost -= reached - left - 1
+            self._last.insert(0, left)
+        self._jump = 0, 0
+        before = max((n for n in self._last if n < number), default=None)
+        if before is not None:
+            self.lost += number - before - 1
+            if number > before + 1:
+                self._jump = before, number
+            if self._last[-1] != before:
+                self._turns.append(time.monotonic())
+            self._last.remove(before)
+        self._last = [*self._last[1 - _OPEN :], number]
 
-    def told(self, node: Any, topic: str) -> str:
+    def in_turn(self, node: Any, topic: str) -> str:
         """Return who sends in turn and what to do; empty where one does."""
-        recent = len(self._back) == _SURE and time.monotonic() - self._back[0] < _WITHIN
+        recent = len(self._turns) == _SURE and time.monotonic() - self._turns[0] < _WITHIN
         found = node.get_publishers_info_by_topic(topic) if recent else []
         if len(found) < 2:
             return ''

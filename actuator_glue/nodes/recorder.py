@@ -125,7 +125,7 @@ class RecorderNode(base.SuiteNode):
             writer.close()
         except InputError as error:
             unfinished = str(error)
-        self._lost += writer.waiting
+        self._lost += writer.waiting + self.unreceived
         found = f'{writer.path}: {writer.count} messages'
         if self._lost:
             # Nobody may take an incomplete bag for a whole one.
