@@ -178,9 +178,11 @@ class RecorderNode(base.SuiteNode):
         return path if self._bags == 0 else path.with_name(f'{path.name}_{self._bags + 1}')
 
     def _record(self, topic: topics.Topic) -> None:
-        """Declare and subscribe to a topic; one that cannot be recorded is reported."""
+        """Declare and subscribe to a topic, once; one that cannot be recorded is reported."""
         assert self.writer is not None
         name = self.resolve_topic_name(topic.name)
+        if name in self._heard:
+            return
         kind = type_name(topic.type)
         try:
             self.writer.add_topic(name, kind, qos=(LATCHED if topic.latched else Qos(),))

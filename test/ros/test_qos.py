@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from actuator_glue_msgs.msg import SampleBlock
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from ros_nodes import QUICK, RATE
+from ros_nodes import QUICK, RATE, recorded
 from std_msgs.msg import String
 
 from actuator_glue.io.bag_reader import decoded
@@ -32,7 +32,8 @@ def test_the_recorder_adapts_to_what_is_offered(start, probe, tmp_path):
     bag = tmp_path / 'bag'
     note = probe.create_publisher(String, 'note', LATCHED)
     note.publish(String(data='written before'))
-    recorder = start('recorder', bag=str(bag), topics=['note'])
+    # Named twice, and one of the suite's: each is recorded once all the same.
+    recorder = start('recorder', bag=str(bag), topics=['note', '/note', 'samples'])
     samples = probe.create_publisher(SampleBlock, 'samples', BEST_EFFORT)
     probe.until(lambda: samples.get_subscription_count(), what='adapted')
     for index in range(0, 100, 10):
@@ -47,6 +48,7 @@ def test_the_recorder_adapts_to_what_is_offered(start, probe, tmp_path):
     probe.until(lambda: probe.for_a_while(0.1) or noted(), what='what was written before')
     assert recorder.end() == 0, recorder.text
     assert noted() == ['written before']
+    assert recorded(bag).tolist() == list(range(100))
 
 
 @pytest.mark.slow
