@@ -13,7 +13,7 @@ _OPEN = 8
 
 
 @dataclass(slots=True)
-class _Stream:
+class _Followed:
     """Blocks that follow each other by index and time; what the next one begins with."""
 
     index: int
@@ -38,7 +38,7 @@ class Publishers:
         self.told = self._begun = ''
         self._first = self._last = -1
         self._blocks = 0
-        self._streams: list[_Stream] = []  # that of the last block at the end
+        self._streams: list[_Followed] = []  # that of the last block at the end
 
     def take(self, block: Block) -> None:
         """Take the next block."""
@@ -50,7 +50,7 @@ class Publishers:
         # Of those that agree to the same sample the one that agrees in time; the last one of two.
         found = min(follows, key=lambda s: abs(s.stamp_ns - block.stamp_ns), default=None)
         if found is None:
-            found = _Stream(end, end_ns, number)
+            found = _Followed(end, end_ns, number)
         elif found is not current:
             self._turn(number, block, current)
             found.taken_over, found.resumed = number, found.resumed + 1
@@ -64,7 +64,7 @@ class Publishers:
         """Whether a block, counted from 0, is one of those that two sent in turn."""
         return bool(self.told) and self._first <= number <= self._last
 
-    def _turn(self, number: int, block: Block, current: _Stream | None) -> None:
+    def _turn(self, number: int, block: Block, current: _Followed | None) -> None:
         """Note that a stream goes on which another one had interrupted."""
         self._last = number
         if self._begun or current is None:
