@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
+from rclpy.impl.implementation_singleton import rclpy_implementation as rcl
 from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
@@ -25,6 +26,12 @@ LINGER = 5.0
 
 def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
     """Run a node until SIGINT, SIGTERM or its own end; return the exit code."""
+    given = list(sys.argv[1:] if args is None else args)
+    beside = given[: given.index('--ros-args')] if '--ros-args' in given else given
+    if beside:
+        text = 'a node takes parameters only, as --ros-args -p NAME:=VALUE, or --params-file FILE'
+        print(f'error: {" ".join(beside)}: {text}', file=sys.stderr)
+        return 2
     return together([make], args)
 
 
@@ -39,7 +46,12 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
     """
     stop = Stop()
     transport.choose()
-    rclpy.init(args=logs.arranged(args), signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=logs.arranged(args), signal_handler_options=SignalHandlerOptions.NO)
+    except (rcl.RCLError, rcl.RCLInvalidROSArgsError, rcl.UnknownROSArgsError) as error:
+        # A file of parameters that is not there or is none, an option of ROS that is misspelt.
+        print(f'error: {error}', file=sys.stderr)
+        return 2
     nodes: list[SuiteNode] = []
     try:
         for make in makes:

@@ -1,8 +1,10 @@
 """A misspelt parameter is said; ROS leaves it out, and the node runs with its default."""
 
+import subprocess
 from types import SimpleNamespace
 
 import pytest
+from ros_nodes import executable
 
 from actuator_glue.nodes import base
 from actuator_glue.nodes.misspelt import misspelt
@@ -33,12 +35,32 @@ def test_parameters_of_other_nodes_are_left_alone(name):
 
 
 def test_a_node_says_it(start, probe, tmp_path):
-    recorder = start('recorder', bag=str(tmp_path / 'bag'), flush_perod=0.1)
-    probe.until(lambda: 'did you mean flush_period?' in recorder.text, what='warning')
-    assert recorder.end() == 0
+    node = start('recorder', bag=str(tmp_path / 'bag'), flush_perod=0.1)
+    probe.until(lambda: 'did you mean flush_period?' in node.text, what='warning')
+    assert node.end() == 0
 
 
 def test_a_number_without_a_point_is_told_how_to_be_written(start):
-    recorder = start('recorder', flush_period=1)
-    assert recorder.wait(60.0) == 2
-    assert 'flush_period = 1 cannot be used: write 1.0' in recorder.text
+    node = start('recorder', flush_period=1)
+    assert node.wait(60.0) == 2
+    assert 'flush_period = 1 cannot be used: write 1.0' in node.text
+
+
+@pytest.mark.parametrize(
+    ('given', 'told'),
+    [
+        (['--flush_period', '1.0'], '--ros-args -p NAME:=VALUE'),
+        (['bag:=here'], '--ros-args -p NAME:=VALUE'),
+        (['--ros-args', '--params-file', 'nowhere.yaml'], 'nowhere.yaml'),
+        (['--ros-args', '--param-file', 'nowhere.yaml'], '--param-file'),
+        (['--ros-args', '-p', 'bag'], 'bag'),
+    ],
+)
+def test_a_command_line_that_cannot_be_used_is_one_error(given, told):
+    """A traceback of rcl, or an argument that nobody looked at."""
+    found = subprocess.run(
+        [executable('recorder'), *given], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert found.returncode == 2
+    assert told in found.stderr.partition('error: ')[2]
+    assert 'Traceback' not in found.stderr
