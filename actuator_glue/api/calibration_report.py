@@ -242,9 +242,7 @@ def next_command(found: CalibrationData) -> str:
     if left is not None and left.setup is not None:
         setup = left.setup
         tests = list(zip(setup.sources, setup.stiffness, strict=True))
-        hold = dict.fromkeys(setup.hold)
-        other = ['--hold', *hold] if len(hold) == 1 and 'hold' in setup.changed else []
-        return command('calibrate', tests, *effects, *other)
+        return command('calibrate', tests, *effects, *setup.options())
     if left is not None and left.other_fits:
         return command('calibrate', tests, *effects, '--hold', left.other_hold)
     # With any other problem, a wider bound would only fit what is wrong.

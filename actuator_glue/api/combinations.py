@@ -16,7 +16,7 @@ from actuator_glue.api.calibration_parts import Marginal, marginals_frame, margi
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.api.given import Records, records_given
-from actuator_glue.api.matlab import Exported, TransferFunction, write_mat
+from actuator_glue.api.matlab import Exported, TransferFunction, delay_of, write_mat
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
 from actuator_glue.diagnosis.verdict.residual_structure import DIAGNOSE
@@ -242,7 +242,7 @@ def _residuals(found: Calibration) -> tuple[Array, ...]:
 def _transfer(found: CombinationsData) -> TransferFunction:
     """Return b / (s^2 + a s + b + c) of the mean of the draws, and of each."""
     draws, names = found.posterior, list(found.combinations)
-    late = float(draws[:, names.index('delay')].mean()) if 'delay' in names else 0.0
+    late = delay_of(names, draws.mean(axis=0))
     b, a, c = draws[:, :3].T
     den = np.column_stack([np.ones_like(b), a, b + c])
     return TransferFunction(

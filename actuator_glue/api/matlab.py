@@ -39,7 +39,7 @@ class TransferFunction(NamedTuple):
     Attributes:
         stiffness: of the specimen [N/m]; NaN where it is not known.
         num, den: polynomials of the mean of the draws.
-        delay: of the command [s].
+        delay: of the command, less its lead [s].
         num_draws, den_draws: polynomials of each draw, a row each.
     """
 
@@ -56,10 +56,16 @@ def under(of: Exported, stiffness: float) -> TransferFunction:
     names = list(of.names)
     columns = [names.index(name) for name in NAMES]
     mean = of.draws.mean(axis=0)
-    late = float(mean[names.index('delay')]) if 'delay' in names else 0.0
+    late = delay_of(names, mean)
     drawn = [polynomials(theta, stiffness) for theta in of.draws[:, columns]]
     rows = np.array([n for n, _ in drawn]), np.array([d for _, d in drawn])
     return TransferFunction(stiffness, *polynomials(mean[columns], stiffness), late, *rows)
+
+
+def delay_of(names: Sequence[str], theta: Array) -> float:
+    """Return the delay of the command, less its lead, of parameters theta (p,) [s]."""
+    known = dict(zip(names, theta, strict=False))
+    return float(known.get('delay', 0.0) - known.get('lead', 0.0))
 
 
 def polynomials(theta: Array, stiffness: float) -> tuple[Array, Array]:

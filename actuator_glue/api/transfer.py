@@ -63,7 +63,7 @@ def state_space(of: Drawn, stiffness: float, draw: str | int) -> Any:
     row = chosen_draw(of, draw)[None]
     k = np.array([check_stiffness(stiffness)])
     model = actuator(row, of.names, of.structure.entries, k)
-    if 'delay' in of.structure.effects:
+    if {'delay', 'lead'} & set(of.structure.effects):
         raise InputError(
             f'the model has a delay of {1e3 * float(model.delay[0]):.3g} ms, which is no rational '
             'function; calibrate without it, or build the delay on top with control.pade'

@@ -79,6 +79,8 @@ def diagnose(
     if other is not None and other.runs_linearly:
         # The search starts with the likelier hold and decides between both at its end.
         ready, other = ready.with_hold('linear', replace(other, taken=True)), None
+    elif other is not None and other.leads:
+        ready, other = replace(ready, also=(hold_and_stiffness.LEAD,)), None
     # The error of a wrong set-up is not the actuator's: it is not searched for effects.
     reach = as_given if other is not None and other.enough else conclude
     result = reach(ready, settings, each, tell, effort)

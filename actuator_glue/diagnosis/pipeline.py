@@ -97,11 +97,12 @@ def _judged_again(begun: _Begun, result: Conclusion, asking: Asking) -> tuple[_B
 def _begun(
     prepared: Prepared, settings: Thresholds, each: Each, effort: Effort, fixed: bool
 ) -> _Begun:
-    refits = Refits(prepared.fit, mean_effects(), each, effort=effort)
+    names = *mean_effects(), *prepared.also
+    refits = Refits(prepared.fit, names, each, effort=effort)
     line = hum.find(prepared.fit, refits.base().error)
     if line is not None:
         data = hum.without(prepared.fit, line)
-        refits = Refits(data, mean_effects(), each, effort=effort)
+        refits = Refits(data, names, each, effort=effort)
     return _Begun(*undetermined_motion.without(prepared, refits, settings, fixed), line)
 
 

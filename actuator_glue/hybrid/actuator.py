@@ -24,7 +24,7 @@ class Actuator(NamedTuple):
 
     Attributes:
         system: piston displacement over command, without delay.
-        delay: of the command, (m,) [s].
+        delay: of the command, less its lead, (m,) [s].
         shown: row that gives the recorded displacement, (n,).
     """
 
@@ -99,4 +99,4 @@ def actuator(
     piston, shown = np.zeros((m, n)), np.zeros(n)
     piston[:, 0] = 1.0
     shown[used.index(5) if 5 in used else 0] = 1.0
-    return Actuator(System(A, B, piston, np.zeros(m)), values['delay'], shown)
+    return Actuator(System(A, B, piston, np.zeros(m)), values['delay'] - values['lead'], shown)

@@ -57,8 +57,13 @@ class Loop:
         """Return the loop of these draws.
 
         Raises:
-            InputError: draws without an Eq. (2a).
+            InputError: draws without an Eq. (2a), or of a record that leads its command.
         """
+        if 'lead' in effects:
+            raise InputError(
+                'the model leads its command, which no actuator in a loop can: calibrate with the '
+                'command as the controller gets it, both channels read at the same instant'
+            )
         stiffness = np.array([partition.specimen.stiffness])
         return cls(
             partition,

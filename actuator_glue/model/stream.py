@@ -59,9 +59,11 @@ class Stream:
         self.period = float(period)
         self.hold = hold
         self._values = structure.values(self.theta[np.newaxis])
-        if self._values['clock_skew'][0] < 0.0 or self._values['delay'][0] < 0.0:
+        self._late = float(self._values['delay'][0] - self._values['lead'][0])
+        if self._values['clock_skew'][0] < 0.0 or self._late < 0.0:
             raise InputError(
-                'a stream cannot run ahead of its command: give clock-skew and delay >= 0'
+                'a stream cannot run ahead of its command: give clock-skew >= 0, and no lead '
+                'beyond the delay'
             )
         self._jitter = float(self._values['jitter'][0])
         self._quantum = float(self._values['quantum'][0])
@@ -153,7 +155,7 @@ class Stream:
 
     def _forget(self, u: Array) -> None:
         """Keep the command samples that later steps may ask for."""
-        lag = self._values['delay'][0] / self.period + self._values['clock_skew'][0] * self._begin
+        lag = self._late / self.period + self._values['clock_skew'][0] * self._begin
         keep = min(len(u), math.ceil(lag) + 3)
         self._history = u[len(u) - keep :].copy()
         self._offset = self._begin - keep

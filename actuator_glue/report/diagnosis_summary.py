@@ -175,9 +175,7 @@ def next_command(found: DiagnosisData) -> str:
     held = [(t.source, t.stiffness) for t in found.traces if t.held_out and t.source not in own]
     if found.setup is not None and not found.setup.taken:
         tests = list(zip(found.setup.sources, found.setup.stiffness, strict=True))
-        hold = dict.fromkeys(found.setup.hold)
-        options = ['--hold', *hold] if len(hold) == 1 and 'hold' in found.setup.changed else []
-        return command('diagnose', tests, *options, held=held)
+        return command('diagnose', tests, *found.setup.options(), held=held)
     if found.verdict == 'undecided' and held:
         return command('diagnose', held)
     if found.learned:

@@ -24,12 +24,12 @@ SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
 
 
 def machine(
-    *stiffness: float, hold: Hold = 'zoh', effect: str = '', seed: int = 5
+    *stiffness: float, hold: Hold = 'zoh', effect: str = '', size: float = 6e-5, seed: int = 5
 ) -> list[Record]:
     """One test with each specimen, 10 um of noise."""
     rng = np.random.default_rng(seed)
     model = Structure([effect] if effect else [])
-    theta = np.append(THETA, 6e-5) if effect else THETA
+    theta = np.append(THETA, size) if effect else THETA
     records = []
     for k in stiffness:
         silent = Record(SWEEP, SWEEP, 1 / RATE, stiffness=k, hold=hold)
@@ -90,6 +90,20 @@ def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> No
     assert {row.scope for row in result.rows()} >= {'', LINEAR}
 
 
+@pytest.mark.parametrize('hold', ['zoh', 'linear'])
+def test_a_displacement_ahead_of_its_command_is_told(hold: Hold) -> None:
+    """By 7.3 ms, nearly a sample; the other hold, which is a lead of half a sample, is not."""
+    records = machine(0.0, 250e3, hold=hold, effect='lead', size=7.3e-3)
+    other = find(prepare(records, []).fit, Thresholds())
+    assert other is not None and other.leads and other.enough
+    assert (other.lead, set(other.hold)) == (pytest.approx(7.3e-3, rel=0.02), {hold})
+    assert f'with the displacement {1e3 * other.lead:.3g} ms ahead of' in other.sentence()
+    assert other.options() == ('--effect', 'lead')
+    found = diagnose(records, settings=Thresholds(evaluations=0))
+    assert found.structure == ('lead',)
+    assert found.verdict == 'missing-effect' and found.setup is None
+
+
 @pytest.mark.parametrize('effect', ['', 'backlash'])
 def test_a_set_up_that_is_right_stays(effect: str) -> None:
     """Of a machine that Eq. (2) describes, and of one with play."""
@@ -106,16 +120,14 @@ def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
     assert found.error.after > 1.5 * found.error.noise_floor
 
 
-def test_a_hold_that_was_not_given_is_held_against_an_effect_under_the_given_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A gain that drifts: linear commands alone explain most of it, and noise hides the rest."""
+def test_a_lead_is_held_against_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A gain that drifts: a lead alone explains most of it, and noise hides the rest."""
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / 'benchmarks' / 'blind'))
     case = import_module('far').build(99043)
     rows = zip(case.commands, case.measured, case.stiffness, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k) for u, y, k in rows]
     other = find(prepare(records[:2], []).fit, Thresholds())
-    assert other is not None and other.runs_linearly and other.enough
+    assert other is not None and other.leads and other.enough
     found = diagnose(records[:2], records[2], settings=Thresholds(evaluations=0))
     assert found.structure == ('gain-drift',) == tuple(case.effects)
     assert found.verdict == 'missing-effect' and found.setup is None

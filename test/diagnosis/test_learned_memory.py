@@ -102,16 +102,23 @@ def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
 
 
 def test_lost_motion_has_one_size(rng_seed: int) -> None:
-    """A share of the reading that has play is one, and must be worth its parameter."""
+    """A share of the reading that has play is one, and must be worth its parameter.
+
+    Noise alone makes a share of one look like less in about one record of a hundred; two of three
+    must be told right.
+    """
     rng = np.random.default_rng(rng_seed)
-    refits, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
-    beam = BeamSearch(refits, Thresholds(), lambda *_: None)
-    beam.renoise()
-    base = refits.trial(())
-    names = 'learned-feedback-hysteresis', 'learned-feedback-play'
-    assert set(names) <= set(beam.promising_terms(base))
-    trials = refits.additions(base, names)
-    assert beam.heaviest([base, *trials]).effects == ('learned-feedback-play',)
+    heaviest = []
+    for _ in range(3):
+        refits, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
+        beam = BeamSearch(refits, Thresholds(), lambda *_: None)
+        beam.renoise()
+        base = refits.trial(())
+        names = 'learned-feedback-hysteresis', 'learned-feedback-play'
+        assert set(names) <= set(beam.promising_terms(base))
+        trials = refits.additions(base, names)
+        heaviest.append(beam.heaviest([base, *trials]).effects)
+    assert heaviest.count(('learned-feedback-play',)) >= 2
 
 
 @pytest.mark.slow

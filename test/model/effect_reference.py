@@ -50,7 +50,7 @@ class Reference:
 
     def command(self, t):
         """Command at the summing junction."""
-        late = t * (1.0 - self.p['clock_skew']) - self.p['delay']
+        late = t * (1.0 - self.p['clock_skew']) - self.p['delay'] + self.p['lead']
         return self.p['gain'] * np.interp(late, self.time, self.u)
 
     def specimen(self, x, z):

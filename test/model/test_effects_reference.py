@@ -18,6 +18,7 @@ OIL = float(TABLE_2[2]) + 250e3
 # Effect, its parameters, stiffness: sizes in the middle of the typical ranges.
 CASES = [
     ('delay', {'delay': 3.3e-3}, 0.0),
+    ('lead', {'lead': 6.1e-3}, 250e3),
     ('gain', {'gain': 0.97}, 250e3),
     ('valve-lag', {'valve_lag': 2e-3}, 250e3),
     ('valve-deadband', {'deadband': 30e-6}, 250e3),
@@ -105,6 +106,7 @@ COMBINATIONS = [
         },
     },
     {'sensor-lag': {'sensor_lag': 3e-3}, 'sensor-feedback': {'feedback_share': 1.0}},
+    {'valve-deadband': {'deadband': 30e-6}, 'delay': {'delay': 1.2e-3}, 'lead': {'lead': 7e-3}},
     {
         'valve-deadband': {'deadband': 30e-6},
         'sensor-lag': {'sensor_lag': 2e-3},

@@ -38,6 +38,7 @@ class Prepared:
         impulses: what was taken out of each fitting record (see hygiene/impulse_removal.py).
         held_impulses: the same for each separate held-out record.
         setup: set-up of the records taken instead of the given one; None for the given one.
+        also: effects that are tried beside the usual ones.
     """
 
     fit: Data
@@ -47,6 +48,7 @@ class Prepared:
     impulses: tuple[Impulses, ...]
     held_impulses: tuple[Impulses, ...]
     setup: WrongSetup | None = None
+    also: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
-"""The hold and the stiffnesses that were given, and whether others explain the records far better.
+"""The set-up that was given, and whether another one explains the records far better.
 
-Stiffnesses that were given to the wrong records, or the wrong hold of the command between its
-samples, look like a machine that is far from Eq. (2). Where Eq. (2) explains far more under
-another set-up, that is said before anything else.
+Stiffnesses that were given to the wrong records, the wrong hold of the command between its
+samples, or a displacement that runs ahead of its command look like a machine that is far from
+Eq. (2). Where Eq. (2) explains far more under another set-up, that is said before anything else.
 """
 
 from __future__ import annotations
@@ -12,19 +12,24 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
+import numpy as np
+
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.thresholds import SETUP_FAR, Thresholds
+from actuator_glue.diagnosis.score.weights import log_weight
+from actuator_glue.diagnosis.thresholds import SETUP_FAR, TELLING, Thresholds
 from actuator_glue.inference.least_squares.data import Data
-from actuator_glue.inference.least_squares.fit import Fit, base_fit
+from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
 from actuator_glue.inference.least_squares.stretches import stretches
 from actuator_glue.json_value import JsonObject
-from actuator_glue.model.effects import scale
+from actuator_glue.model.effects import CATALOGUE, scale
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Hold, source_names
 
 _RUNS = {
     'linear': 'running linearly between its samples (--hold linear)',
     'zoh': 'held between its samples (--hold zoh)',
 }
+LEAD = 'lead'
 _MOST = 6  # with up to so many records, any two may have been exchanged
 
 
@@ -36,11 +41,12 @@ class WrongSetup(JsonObject):
         sources: names of the records.
         stiffness: the specimen stiffness of each record under it [N/m].
         hold: how the command of each record runs between its samples under it.
-        changed: what is not as given: 'stiffness', 'hold' or both.
+        changed: what is not as given: 'stiffness', 'hold' or both; or 'lead'.
         error: rms error of Eq. (2) refitted under it [m].
         as_given: rms error of Eq. (2) refitted under the set-up that was given [m].
         enough: whether Eq. (2) alone leaves nothing under it that matters.
         taken: whether the diagnosis is one under it; else it is one as given.
+        lead: time by which the displacement runs ahead of its command under it [s].
     """
 
     sources: tuple[str, ...]
@@ -51,6 +57,7 @@ class WrongSetup(JsonObject):
     as_given: float
     enough: bool
     taken: bool = False
+    lead: float = 0.0
 
     @classmethod
     def between(
@@ -60,6 +67,7 @@ class WrongSetup(JsonObject):
         errors: tuple[float, float],
         enough: bool,
         taken: bool = False,
+        lead: float = 0.0,
     ) -> WrongSetup:
         """Return what differs between the set-up of some data and another one of the same.
 
@@ -69,11 +77,13 @@ class WrongSetup(JsonObject):
             errors: rms errors of Eq. (2), refitted as given and under the other one [m].
             enough: as the attribute.
             taken: as the attribute.
+            lead: as the attribute [s].
         """
         was, now = given.recorded, other.recorded
         changed = {
             'stiffness': any(a.stiffness != b.stiffness for a, b in zip(was, now, strict=True)),
             'hold': any(a.hold != b.hold for a, b in zip(was, now, strict=True)),
+            LEAD: lead > 0.0,
         }
         return cls(
             sources=tuple(r.source or f'record {i + 1}' for i, r in enumerate(was)),
@@ -84,12 +94,25 @@ class WrongSetup(JsonObject):
             as_given=errors[0],
             enough=enough,
             taken=taken,
+            lead=lead,
         )
 
     @property
     def runs_linearly(self) -> bool:
         """Whether it differs in one thing: the command runs linearly and was given as held."""
         return self.changed == ('hold',) and 'linear' in self.hold
+
+    @property
+    def leads(self) -> bool:
+        """Whether it differs in one thing: the displacement runs ahead of its command."""
+        return self.changed == (LEAD,)
+
+    def options(self) -> tuple[str, ...]:
+        """Return the words of the command line for it, beside the stiffnesses."""
+        if self.leads:
+            return '--effect', LEAD
+        holds = tuple(dict.fromkeys(self.hold))
+        return ('--hold', *holds) if len(holds) == 1 and 'hold' in self.changed else ()
 
     def sentence(self) -> str:
         """Say what to check, or what was taken instead."""
@@ -101,6 +124,11 @@ class WrongSetup(JsonObject):
             parts.append(f'specimen stiffnesses exchanged ({order})')
         if 'hold' in self.changed:
             parts.append(f'the command {_RUNS["linear" if "linear" in self.hold else "zoh"]}')
+        if self.leads:
+            parts.append(
+                f'the displacement {1e3 * self.lead:.3g} ms ahead of the recorded command (as '
+                'behind a compensator, or with channels that were not read at once)'
+            )
         alone = (
             f'Eq. (2) alone leaves {1e6 * self.error:.1f} um '
             f'instead of {1e6 * self.as_given:.1f} um'
@@ -126,16 +154,36 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
         return None
     others = list(_others(data))
     parts = [stretched(other) for other in others]
-    fits = [base_fit(part) for part in parts]
-    best = min(range(len(fits)), key=lambda i: fits[i].rms)
-    fit = fits[best]
-    left, noise = pooled(parts[best], splits_of(parts[best], fit.error))
+    ways = [(p, base_fit(p)) for p in parts]
+    best = min(range(len(ways)), key=lambda i: ways[i][1].rms)
+    ahead = _ahead(some, given)
+    part, found = min(ways[best], ahead, key=lambda way: way[1].rms)
+    noise = pooled(part, splits_of(part, found.error))[1]
     material = settings.material(noise, stroke)
-    if given.rms**2 - fit.rms**2 < max(material**2, (SETUP_FAR - 1.0) * fit.rms**2):
+    leads = _weight(ahead[1], material) > _weight(ways[best][1], material)
+    part, found = ahead if leads else ways[best]
+    if given.rms**2 - found.rms**2 < max(material**2, (SETUP_FAR - 1.0) * found.rms**2):
         return None
-    if _nats(parts[best], fit, given) < settings.nats + math.log(len(others)):
+    if _nats(part, found, given) < settings.nats + math.log(len(ways) + 1):
         return None
-    return WrongSetup.between(data, others[best], (given.rms, fit.rms), left < material)
+    return WrongSetup.between(
+        data,
+        data if leads else others[best],
+        (given.rms, found.rms),
+        pooled(part, splits_of(part, found.error))[0] < material,
+        lead=float(found.theta[-1]) if leads else 0.0,
+    )
+
+
+def _weight(found: Fit, material: float) -> float:
+    return log_weight(found.rms, TELLING * material, len(found.theta))
+
+
+def _ahead(data: Data, given: Fit) -> tuple[Data, Fit]:
+    """Fit Eq. (2) with a displacement that runs ahead of its command."""
+    effect = CATALOGUE[LEAD]
+    starts = [(*given.theta, *sizes) for sizes in effect.starts(scale(data.records, given.theta))]
+    return data, fit(data, Structure((effect,)), np.array(starts))
 
 
 def stretched(data: Data) -> Data:

@@ -9,9 +9,9 @@ force over oil stiffness f, rate of the flow q', recorded displacement y:
     mass:     m v' = d2 f - k x - (c + m d) v,  d2 f' = d2 q - alpha_3 d2 f - alpha_2 v
     T_s y' = x - y
 
-with d2 = k + alpha_2. A delay moves the command by whole samples and a fraction, at which a held
-command changes and a linear one bends: both enter exactly, through the integral and the double
-integral of the transition matrix (docs/effects_method.md, 'Linear effects').
+with d2 = k + alpha_2. A delay, less a lead, moves the command by whole samples and a fraction, at
+which a held command changes and a linear one bends: both enter exactly, through the integral and
+the double integral of the transition matrix (docs/effects_method.md, 'Linear effects').
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def _fill(
             small_b[r] = b[used[r]]
             for c in range(p):
                 small_a[r, c] = a[used[r], used[c]]
-        lag = t.delay / period if t.delay == t.delay else 0.0
+        lag = (t.delay - t.lead) / period if t.delay == t.delay else 0.0
         whole = math.floor(lag)
         part = lag - whole
         transition.fill(small_a, small_b, scale, period, phi, first, second)
