@@ -1,9 +1,10 @@
-"""Readings that stand still although the piston must move.
+"""Readings that nobody measured: they stand still, or run straight, where the piston must not.
 
 A converter that hangs, or a packet that is sent again, repeats one value exactly. A piston that
 play or friction holds still does not: what a model then misses is part of its whole residual, and
 a channel's grid holds it for one step at most. A reading that is never exceeded is an end of the
-channel's range: that is the transducer's, and stays.
+channel's range: that is the transducer's, and stays. Missing samples that somebody filled in lie
+on a straight line, with none of the noise around them.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ from actuator_glue.records import Array, Record
 _REPEATS = 3  # equal readings at least
 _BEYOND = 8.0  # times the residual's robust size
 _STEPS = 2.0  # of the channel's grid
+_STRAIGHT = 4  # samples on a line at least, between its ends
+_BENT = 0.02  # of the usual second difference: noise is as straight once in 10^8 samples
 
 
 @dataclass(frozen=True)
 class Frozen:
-    """Stretches of one record, first and last repeated sample of each, (c,)."""
+    """Stretches of one record that nobody measured, first and last sample of each, (c,)."""
 
     first: NDArray[np.intp]
     last: NDArray[np.intp]
@@ -30,10 +33,24 @@ class Frozen:
 
 def repeats(values: Array) -> Frozen:
     """Return where a channel (n,) repeats a reading, often enough to ask whether it is frozen."""
-    same = np.concatenate([[False], values[1:] == values[:-1], [False]])
-    first, last = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2).T
-    long = last - first >= _REPEATS - 1
-    return Frozen(first[long] + 1, last[long])
+    first, last = _runs(values[1:] == values[:-1])
+    long = last - first >= _REPEATS - 2
+    return Frozen(first[long] + 1, last[long] + 1)
+
+
+def lines(values: Array) -> Frozen:
+    """Return where a channel (n,) runs on a straight line without noise, from value to value."""
+    bend = np.abs(np.diff(values, 2))
+    moves = values[2:] != values[:-2]
+    first, last = _runs(moves & (bend <= _BENT * np.median(bend)))
+    long = last - first >= _STRAIGHT - 1
+    return Frozen(first[long] + 1, last[long] + 1)
+
+
+def _runs(true: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the first and last index of each run of what is true, (2, c)."""
+    edges = np.diff(np.concatenate([[False], true, [False]]).astype(np.int8))
+    return np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1])
 
 
 def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
@@ -45,16 +62,39 @@ def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
         output: of a model that was fitted, at the same times, (n,) [m].
     """
     y, first, last = record.measured, repeated.first - 1, repeated.last
-    off = y - output
-    noise = 1.4826 * float(np.median(np.abs(off - np.median(off))))
     steps = np.abs(np.diff(y))
     grid = float(steps[steps > 0.0].min(initial=np.inf))
     edges = np.stack([first, last + 1], axis=1).ravel()
     edges = edges[edges < len(y)]
     motion = np.maximum.reduceat(output, edges) - np.minimum.reduceat(output, edges)
-    far = motion[::2] > max(_BEYOND * noise, _STEPS * grid)
+    far = motion[::2] > max(_BEYOND * _noise(y - output), _STEPS * grid)
     far &= (y[last] > y.min()) & (y[last] < y.max())  # else it is at an end of its range
     return Frozen(repeated.first[far], last[far])
+
+
+def while_bending(lines: Frozen, record: Record, output: Array) -> Frozen:
+    """Return those lines from which a model's output departs beyond noise.
+
+    Args:
+        lines: see `lines`; one at least.
+        record: as it was sampled.
+        output: of a model that was fitted, at the same times, (n,) [m].
+    """
+    noise = _noise(record.measured - output)
+    ends = list(zip(lines.first - 1, lines.last + 2, strict=True))
+    own, bends = (np.array([_bend(c[a:b]) for a, b in ends]) for c in (record.measured, output))
+    # Slow motion without noise is nearly straight, and so is its model.
+    far = bends > _BEYOND * np.maximum(noise, own)
+    return Frozen(lines.first[far], lines.last[far])
+
+
+def _noise(error: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(error - np.median(error))))
+
+
+def _bend(values: Array) -> float:
+    """Return how far values (n,) depart from the line between their ends."""
+    return float(np.ptp(values - np.linspace(values[0], values[-1], len(values))))
 
 
 def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_glue.hygiene import frozen
 from actuator_glue.hygiene.checks import where
+from actuator_glue.hygiene.frozen import Frozen
 from actuator_glue.hygiene.impulses import NONE, Impulses, Motion, beyond, find, in_command
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import SETTLE, Data
@@ -18,6 +19,13 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
+# How readings that nobody measured are told: what they do, where, and what that is.
+_STOOD = 'stands still', 'while the piston must move', 'a frozen channel'
+_STRAIGHT = (
+    'runs on a straight line without noise',
+    'where the piston must not',
+    'missing samples that were filled in',
+)
 _DROPPED = 10  # repeats beyond which a reading may be that of a channel without signal
 _TRIMS = 2  # refits without the samples that stood out of the last one
 
@@ -135,31 +143,40 @@ def _phase(output: Array, measured: Array) -> Array:
 
 
 def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[str]]:
-    """Bridge readings that stand still while a model moves.
+    """Bridge readings that stand still, or run straight, while a model does not.
 
     Returns:
-        The data with the model's motion in place of repeated readings, and what was done.
+        The data with the model's motion in place of such readings, and what was done.
     """
     records, notes = [], []
     rows = zip(data.records, data.recorded, data.factors, data.initials, strict=True)
     for i, (record, whole, count, initial) in enumerate(rows):
         records.append(record)
-        repeated = frozen.repeats(whole.measured)
-        if not len(repeated.first):
+        repeats, lines = frozen.repeats(whole.measured), frozen.lines(whole.measured)
+        if not len(repeats.first) and not len(lines.first):
             continue
         output = model.simulate(theta[None], record, initial=initial, origin=data.origins[i])[0]
         fine = output if count == 1 else np.interp(whole.time, record.time, output)
-        found = frozen.while_moving(repeated, whole, fine)
-        if len(found.first):
-            sizes = found.last + 1 - found.first
-            notes.append(
-                f'{where(record, i + 1)}: the measured displacement stands still {len(sizes)} '
-                f'times while the piston must move ({int(sizes.sum())} of {len(whole)} samples, '
-                f'up to {1e3 * float(sizes.max()) * whole.period:.3g} ms): a frozen channel; the '
-                "model's motion stands in their place"
-            )
-            records[i] = replace(record, measured=frozen.bridged(record, found, output, count))
+        for suspects, departing, said in (
+            (repeats, frozen.while_moving, _STOOD),
+            (lines, frozen.while_bending, _STRAIGHT),
+        ):
+            found = departing(suspects, whole, fine) if len(suspects.first) else suspects
+            if len(found.first):
+                notes.append(f'{where(record, i + 1)}: {_told_frozen(found, whole, *said)}')
+                mended = frozen.bridged(records[i], found, output, count)
+                records[i] = replace(record, measured=mended)
     return (replace(data, records=tuple(records)) if notes else data), notes
+
+
+def _told_frozen(found: Frozen, whole: Record, how: str, while_: str, what: str) -> str:
+    sizes = found.last + 1 - found.first
+    return (
+        f'the measured displacement {how} {len(sizes)} time{"s" if len(sizes) > 1 else ""} '
+        f'{while_} ({int(sizes.sum())} of {len(whole)} samples, up to '
+        f"{1e3 * float(sizes.max()) * whole.period:.3g} ms): {what}; the model's motion stands in "
+        'their place'
+    )
 
 
 def told(records: Sequence[Record], impulses: Sequence[Impulses]) -> list[str]:

@@ -28,25 +28,32 @@ def machine(
 
 
 @pytest.mark.parametrize('rate', [500.0, 4000.0])
-def test_a_channel_that_freezes_is_bridged_and_told(rate: float) -> None:
+@pytest.mark.parametrize(
+    ('filled', 'what', 'kind'),
+    [(False, 'stands still', 'frozen'), (True, 'runs on a straight line', 'filled in')],
+)
+def test_readings_that_nobody_measured_are_bridged_and_told(
+    filled: bool, what: str, kind: str, rate: float
+) -> None:
+    """A channel that froze, and gaps that somebody filled with lines."""
     record, x = machine(rate, 1)
     y, rng = record.measured.copy(), np.random.default_rng(5)
     starts = 6.0 + 2.0 * np.arange(8) + rng.uniform(0.0, 1.0, 8)
     lengths = rng.uniform(0.02, 0.3, 8)
     places = zip((starts * rate).astype(int), (lengths * rate).astype(int), strict=True)
     for at, size in places:
-        y[at : at + size] = y[at]
+        y[at : at + size] = np.linspace(y[at], y[at + size], size, False) if filled else y[at]
     given = replace(record, measured=y)
     prepared = prepare([given], [])
-    note = next(n for n in prepared.notes if 'frozen' in n)
-    assert 'stands still' in note
+    note = next(n for n in prepared.notes if kind in n)
+    assert what in note
     healthy = prepare([record], [])
     bent, found = base_fit(healthy.fit).theta, base_fit(prepared.fit).theta
     assert found[0] == pytest.approx(bent[0], rel=0.005)
     kept = prepared.fit.records[0].measured - healthy.fit.records[0].measured
     assert np.abs(kept).max() < 30e-6
     clean, notes, _ = despiked([given], ['rest'])
-    assert any('frozen' in n for n in notes)
+    assert any(kind in n for n in notes)
     assert np.abs(clean[0].measured - x).max() < 40e-6
 
 
@@ -62,4 +69,4 @@ def test_a_piston_that_stands_still_is_no_frozen_channel(
     _, x = machine(1000.0, 2, effects, *own)
     y = np.round(x / grid) * grid if grid else x
     record = replace(machine(1000.0, 2)[0], measured=y)
-    assert not any('frozen' in n for n in prepare([record], []).notes)
+    assert not any('frozen' in n or 'filled' in n for n in prepare([record], []).notes)

@@ -17,7 +17,7 @@ PAGE = Path(actuator_glue.__file__).resolve().parent.parent / 'docs' / 'effects_
 
 
 PLACES = {
-    'command': {'delay', 'gain', 'command-lag', 'command-rate'},
+    'command': {'delay', 'lead', 'gain', 'command-lag', 'command-rate'},
     'valve': {
         'valve-lag',
         'valve-deadband',
