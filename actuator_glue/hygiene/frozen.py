@@ -18,6 +18,7 @@ from actuator_glue.records import Array, Record
 
 _REPEATS = 3  # equal readings at least
 _BEYOND = 8.0  # times the residual's robust size
+_DEPARTING = 3.0  # the same from a line, which no noise is
 _STEPS = 2.0  # of the channel's grid
 _STRAIGHT = 4  # samples on a line at least, between its ends
 _BENT = 0.02  # of the usual second difference: noise is as straight once in 10^8 samples
@@ -84,7 +85,7 @@ def while_bending(lines: Frozen, record: Record, output: Array) -> Frozen:
     ends = list(zip(lines.first - 1, lines.last + 2, strict=True))
     own, bends = (np.array([_bend(c[a:b]) for a, b in ends]) for c in (record.measured, output))
     # Slow motion without noise is nearly straight, and so is its model.
-    far = bends > _BEYOND * np.maximum(noise, own)
+    far = bends > np.maximum(_DEPARTING * noise, _BEYOND * own)
     return Frozen(lines.first[far], lines.last[far])
 
 
