@@ -8,6 +8,7 @@ import numpy as np
 import scipy.signal
 
 from actuator_glue.diagnosis.estimate import Json
+from actuator_glue.diagnosis.scopes.change import Change
 from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data, Mask
@@ -34,6 +35,8 @@ class Onset:
         growth: time it took to grow to its size [s]; 0 where it was there at once.
         effects: what appeared; empty where parameters changed, of Eq. (2) or of an effect.
         before: effects that were there before.
+        change: the one thing that changed, where Eq. (2) holds on both sides and one thing is
+            enough.
     """
 
     source: str
@@ -43,6 +46,7 @@ class Onset:
     growth: float
     effects: tuple[str, ...]
     before: tuple[str, ...] = ()
+    change: Change | None = None
 
     def sentence(self) -> str:
         """Say when and how it appeared, and what the rest of the diagnosis stands on."""
@@ -50,6 +54,8 @@ class Onset:
         what = f'{", ".join(self.effects)} appeared' if self.effects else (
             f'the parameters of Eq. (2){" or of an effect" if self.before else ""} changed'
         )  # fmt: skip
+        if self.change is not None:
+            what = f'{self.change.sentence()}, which explains the change alone,'
         before = f', beside {", ".join(self.before)},' if self.before else ''
         return (
             f'{what}{before} {self.time:.2f} s (95 % {self.lower:.2f} to {self.upper:.2f} s) into '
@@ -67,6 +73,7 @@ class Onset:
             'growth': self.growth,
             'effects': list(self.effects),
             'before': list(self.before),
+            'change': self.change.to_json() if self.change else None,
         }
 
 

@@ -12,6 +12,7 @@ from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
+from actuator_glue.diagnosis.scopes import change
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.scopes.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.score import regression
@@ -125,7 +126,12 @@ class Conclusion:
         """When the effects appeared; None if they were there from the beginning."""
         if self.appeared is None:
             return None
-        return dated(self.appeared, self.decision.final, self.decision.noise)
+        before, final = self.appeared.before, self.decision.final
+        found = dated(self.appeared, final, self.decision.noise)
+        if before.effects or final.effects or final.own is not None:
+            return found
+        one = change.alone(before, self.data, final.fit.rms, self.found.material)
+        return replace(found, change=one)
 
     def of(self, beam: BeamSearch, found: Selection) -> Conclusion:
         """Return what another selection of effects says about the same records."""

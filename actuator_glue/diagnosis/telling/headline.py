@@ -164,7 +164,9 @@ def _verdict(found: Told) -> str:
         source = found.onset.source
         when = f' since {found.onset.time:.1f} s of {names_of(found)[source]}'
         names += when if names else ''
-        enough += f'{when}, where its parameters changed'
+        one = found.onset.change
+        changed = 'its parameters changed' if one is None else one.sentence()
+        enough += f'{when}, where {changed}'
     change = f'held-out error {_errors(found, bool(names))}, {_noise(found)}'
     if found.verdict == 'undecided':
         asked = f'for {names}, the held-out part does not' if names else 'for nothing'
