@@ -61,8 +61,9 @@ class Loop:
         """
         if 'lead' in effects:
             raise InputError(
-                'the model leads its command, which no actuator in a loop can: calibrate with the '
-                'command as the controller gets it, both channels read at the same instant'
+                'the model leads its command, as behind a compensator: calibrate with the command '
+                'as the controller gets it, both channels read at the same instant, and give the '
+                'compensator to the hybrid test'
             )
         stiffness = np.array([partition.specimen.stiffness])
         return cls(

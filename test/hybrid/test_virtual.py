@@ -95,6 +95,14 @@ def test_a_plain_loop_gives_the_same() -> None:
     np.testing.assert_allclose(found.response[:, 0, 1], shown, atol=1e-9 * np.abs(shown).max())
 
 
+def test_a_model_that_leads_its_command_has_no_loop() -> None:
+    """The compensator that leads belongs into the hybrid test, not into the actuator."""
+    partition = quiet('benchmark_case_1')
+    specimen = partition.specimen.drawn(np.random.default_rng(0), 1)
+    with pytest.raises(ag.InputError, match='give the compensator to the hybrid test'):
+        Loop.of(partition, np.append(THETA, 7e-3)[None], (*BASE, 'lead'), ('lead',), specimen)
+
+
 def test_the_compiled_effects_step_is_the_linear_one() -> None:
     """Friction that is neutral, a delay of parts of a sample, both compensators: one response."""
     partition = quiet('benchmark_case_1', computation_delay=7e-4)
