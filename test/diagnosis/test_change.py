@@ -35,7 +35,9 @@ def test_one_thing_that_changed_is_told(name: str, factor: float, rng_seed: int)
     """Of 400 machines all were told."""
     rng = np.random.default_rng(rng_seed)
     theta, k = THETA * np.exp(0.1 * rng.standard_normal(4)), K
-    before = Trial(Structure(), '', base_fit(Data.whole(records(theta, k, 12.0, rng))), np.zeros(0))
+    before = Trial(
+        Structure(), '', base_fit(Data.whole(records(theta, k, 12.0, rng))), np.zeros(0)
+    )
     if name == STIFFNESS:
         k *= factor
     else:
@@ -49,7 +51,9 @@ def test_one_thing_that_changed_is_told(name: str, factor: float, rng_seed: int)
 def test_two_things_that_changed_are_not_one(rng_seed: int) -> None:
     """Nor is a machine that nothing describes since then."""
     rng = np.random.default_rng(rng_seed)
-    before = Trial(Structure(), '', base_fit(Data.whole(records(THETA, K, 12.0, rng))), np.zeros(0))
+    before = Trial(
+        Structure(), '', base_fit(Data.whole(records(THETA, K, 12.0, rng))), np.zeros(0)
+    )
     changed = THETA * [1.0, 1.2, 1.0, 4.0]
     since = Data.whole(records(changed, 0.7 * K, 12.0, rng))
     assert alone(before, since, base_fit(since).rms, MATERIAL) is None
