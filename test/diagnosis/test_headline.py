@@ -10,6 +10,7 @@ import pytest
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.finding import Finding, Rival
+from actuator_glue.diagnosis.scopes.change import Change
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.scopes.onset import Onset
 from actuator_glue.diagnosis.telling.advice import contradicted, zeros
@@ -338,6 +339,28 @@ def test_a_name_that_is_improbable_is_never_told_as_missing(
         assert said.startswith('missing: one of backlash (30 %), valve-deadband (40 %); ')
     else:
         assert f'something that looks most like backlash ({100 * own:.2g} %)' in said
+
+
+@pytest.mark.parametrize(
+    ('change', 'where'),
+    [
+        (None, 'its parameters changed'),
+        (
+            Change('stiffness', 0.7, 1e-5),
+            'the stiffness of the specimen became 70 % of what it was',
+        ),
+    ],
+)
+def test_a_change_is_what_the_records_ask_for(change: Change | None, where: str) -> None:
+    """Where the held-out part confirms it, and where it does not."""
+    onset = Onset('b.csv', 9.0, 8.0, 10.0, 0.0, (), (), change)
+    told = replace(diagnosis('none', 10e-6, 10e-6), onset=onset)
+    assert told.summary().startswith(f'the model is enough since 9.0 s of b.csv, where {where}: ')
+    told = replace(diagnosis('none', 198e-6, 198e-6), onset=onset)
+    assert told.summary().startswith(
+        f'undecided: the fitting records ask for a change since 9.0 s of b.csv, where {where}, '
+        'the held-out part does not; held-out error 198.0 um'
+    )
 
 
 def test_a_wrong_setup_comes_first() -> None:

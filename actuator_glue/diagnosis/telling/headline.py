@@ -159,17 +159,18 @@ def headline(found: Told) -> str:
 
 def _verdict(found: Told) -> str:
     names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
-    enough = 'the model is enough'
+    enough, asked = 'the model is enough', names
     if found.onset is not None:
         source = found.onset.source
         when = f' since {found.onset.time:.1f} s of {names_of(found)[source]}'
-        names += when if names else ''
         one = found.onset.change
         changed = 'its parameters changed' if one is None else one.sentence()
+        names += when if names else ''
+        asked = names or f'a change{when}, where {changed}'
         enough += f'{when}, where {changed}'
     change = f'held-out error {_errors(found, bool(names))}, {_noise(found)}'
     if found.verdict == 'undecided':
-        asked = f'for {names}, the held-out part does not' if names else 'for nothing'
+        asked = f'for {asked}, the held-out part does not' if asked else 'for nothing'
         return f'undecided: the fitting records ask {asked}; {change}'
     if found.verdict == 'unexplained':
         rest = f'{1e6 * found.remaining["left"]:.1f} um of structure in the fitting records remain'
