@@ -149,9 +149,6 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     some = stretched(data)
     given = given or base_fit(some)
     stroke = scale(some.records, given.theta).stroke
-    left, noise = pooled(some, splits_of(some, given.error))
-    if left < settings.material(noise, stroke):
-        return None
     others = list(_others(data))
     parts = [stretched(other) for other in others]
     ways = [(p, base_fit(p)) for p in parts]
