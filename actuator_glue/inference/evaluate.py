@@ -52,6 +52,6 @@ def check_values(values: Array, x: Array) -> None:
         refuse_infinite(x[int(np.isposinf(values).argmax())])
     if not np.isfinite(values).any():
         raise InputError(
-            f'the log density is not finite at any of {len(x)} points of the prior; '
+            f'the log density is not finite at any of {len(x)} points to start from; '
             'check the bounds, the units and the records'
         )

@@ -1,5 +1,6 @@
 """One record's own setting stands beside whatever was found, learned terms among it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,6 +9,8 @@ from two_sweeps import NOISE, RATE, selected_of, sweep
 
 from actuator_glue.diagnosis.moves.own_setting import _with_setting
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
+from actuator_glue.diagnosis.verdict.both_parts import _where_it_acts
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -43,3 +46,21 @@ def test_a_setting_is_tried_beside_a_learned_term() -> None:
     assert told.final.own.scope == 'bias in a/2.csv only'
     assert told.left < told.material
     assert all(TERM in row.effects for row in rows)
+
+
+def test_only_a_held_out_record_tells_how_it_was_set() -> None:
+    """Two tests of the set-up whose gain was another one: it was so in one of them again."""
+    rng = np.random.default_rng(4)
+    u, structure = sweep(2e-3, 8.0, 16.0), Structure(('gain',))
+
+    def record(gain: float) -> Record:
+        rest = Record(u, u, 1.0 / RATE, 250e3)
+        y = structure.simulate(np.append(THETA, gain), rest)
+        return replace(rest, measured=y + NOISE * rng.standard_normal(len(u)))
+
+    fitted, set_again, as_usual = record(1.02), record(1.02), record(1.0)
+    own = OneRecord(structure, 'gain', (fitted,))
+    held = Data.whole([as_usual, set_again])
+    found = _where_it_acts(own, np.append(THETA, 1.02), held)
+    assert found.own == 'gain' and len(found.records) == 2
+    assert found.records[0] is fitted and found.records[1] is set_again

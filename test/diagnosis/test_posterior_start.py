@@ -8,6 +8,7 @@ from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.posterior import posterior
 from actuator_glue.diagnosis.posterior.identifiable import Working
 from actuator_glue.diagnosis.telling import advice
+from actuator_glue.errors import InputError
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model.structure import Structure
@@ -49,6 +50,19 @@ def test_chains_keep_the_spread_of_the_posterior(
         assert 1 / factor < ratio < factor, found.names[j]
     estimate = next(iter(found.effects[0].parameters.values()))
     assert estimate.mean == pytest.approx(size, abs=5 * estimate.stddev)
+
+
+def test_chains_that_cannot_begin_lose_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many parameters pressed against their bounds, around which no point is possible."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise InputError('the log density is not finite at any of 35 points to start from')
+
+    monkeypatch.setattr(posterior.importance, 'sample', lambda *_: None)
+    monkeypatch.setattr(posterior.posterior, 'sample', refused)
+    found = diagnose(make(['delay'], [0.004], 31, 12.0), seed=2)
+    assert found.sampler['method'] == 'laplace'
+    assert found.structure == ('delay',)
 
 
 @pytest.mark.slow

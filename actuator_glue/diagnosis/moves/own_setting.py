@@ -24,7 +24,6 @@ from actuator_glue.diagnosis.search.table import Row, row
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -52,18 +51,6 @@ def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
     return replace(result, others=(*result.others, *rows))
 
 
-def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:
-    """The record and the held-out tests of its set-up.
-
-    All tests under its stiffness if no other record has that, else those of its own command.
-    """
-    own = data.records[index]
-    stiffness = own.known_stiffness()
-    if sum(r.known_stiffness() == stiffness for r in data.records) > 1:
-        return (own, *(r for r in held if np.array_equal(r.command, own.command)))
-    return (own, *(r for r in held if r.known_stiffness() == stiffness))
-
-
 def _with_setting(
     result: Conclusion, beam: BeamSearch, effects: tuple[str, ...]
 ) -> tuple[tuple[Row, ...], Selection | None]:
@@ -84,10 +71,10 @@ def _with_setting(
         return (), None
     start, held = refits.trial(effects), result.prepared.held.records
     tried = [
-        _fitted(refits, start, name, _members(data, held, i), held)
+        _fitted(refits, start, name, record, held)
         for name in SETTINGS
         if name not in effects
-        for i in range(len(data.records))
+        for record in data.records
     ]
     tried.sort(key=lambda t: scorer.left_out_error(t.fit))  # their price is the same
     rows = tuple(_row(refits, t, start.structure, len(tried)) for t in tried)
@@ -112,11 +99,11 @@ def _fitted(
     refits: Refits,
     start: Trial,
     name: str,
-    records: tuple[Record, ...],
+    record: Record,
     held: tuple[Record, ...],
 ) -> Trial:
     structure = refits.structure(*start.effects, name)
-    model = OneRecord(structure, name, records, (*refits.data.records, *held))
+    model = OneRecord(structure, name, (record,), (*refits.data.records, *held))
     thetas = refits.promises.screen(start, name)[1]
     found = fit(refits.data, model, thetas)
     assert refits.scorer is not None

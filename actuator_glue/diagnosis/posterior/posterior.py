@@ -19,6 +19,7 @@ from actuator_glue.diagnosis.posterior.identifiable import Straight, Working, co
 from actuator_glue.diagnosis.posterior.likelihood import Likelihood, Optimum, most_likely
 from actuator_glue.diagnosis.refits import poles
 from actuator_glue.diagnosis.score.scorer import Scorer, inflation
+from actuator_glue.errors import InputError
 from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
@@ -264,8 +265,10 @@ def sample(
             enough=_enough,
             progress=lambda done, all_: progress(done / all_),
         )
-    except posterior.NoPosteriorError:
-        return approximated()  # `method` says so
+    except InputError:
+        # No draws in time, or a structure pressed against its bounds, around which no point is
+        # possible: `method` says that they are approximated.
+        return approximated()
     return Draws(
         loosened(chains.posterior()),
         'dream',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -44,6 +45,12 @@ class OneRecord:
     def parameters(self) -> tuple[Parameter, ...]:
         """Those of the structure, in its order."""
         return self._inner.parameters
+
+    def acting_in(self, records: Sequence[Record]) -> OneRecord:
+        """Return the same structure, whose own effect acts in other records."""
+        other = copy(self)
+        other.records = tuple(records)
+        return other
 
     def simulate(
         self,

@@ -88,7 +88,7 @@ def of(
     own = decision.final.own
     if own is not None:
         out.append(
-            f'{decision.final.added} acts in one record only: that channel may have been set '
+            f'{decision.final.added} does not act in all records: that channel may have been set '
             'differently between these tests; check its setting, or diagnose them apart'
         )
     if decision.verdict == 'unexplained':

@@ -14,12 +14,15 @@ from actuator_glue.diagnosis.posterior import agreement
 from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.posterior.answer_posterior import AnswerPosterior, estimates
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
+from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.verdict import findings, held_out_reach, rules
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.held_out_look import BandCurves, verify
 from actuator_glue.diagnosis.verdicts import COMPLETE, Verdict
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.records import Array
 
 
@@ -54,6 +57,19 @@ class BothParts:
     setup: WrongSetup | None
 
 
+def _where_it_acts(own: OneRecord, theta: Array, held: Data) -> OneRecord:
+    """Return one record's own setting in those held-out records, too, that fit better with it.
+
+    How a test was set of which nothing was fitted, only that test tells.
+    """
+    without = held.split(held.target - held.simulate(own, theta)[0])
+    everywhere = own.acting_in(held.records)
+    within = held.split(held.target - held.simulate(everywhere, theta)[0])
+    rows = zip(held.records, within, without, strict=True)
+    more = [record for record, a, b in rows if rms(a) < rms(b)]
+    return own.acting_in((*own.records, *more))
+
+
 def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) -> BothParts:
     """Look at the held-out part once, and return the verdict of both parts.
 
@@ -65,6 +81,10 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) 
     """
     result, before, after = drawn.result, drawn.before, drawn.after
     decision, found = result.decision, result.found
+    if isinstance(after.model, OneRecord):
+        own = _where_it_acts(after.model, after.theta, result.prepared.held)
+        after = replace(after, model=own)
+        decision = replace(decision, final=replace(decision.final, own=own))
     held, fitted = (replace(d, each=each) for d in (result.prepared.held, result.data))
     error, coverage, curves = verify(
         fitted, held, before, after, decision.noise, seed, result.line, len(found.singles)

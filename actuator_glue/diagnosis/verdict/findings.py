@@ -98,10 +98,10 @@ def _cause(name: str, rivals: tuple[Rival, ...]) -> str:
 
 
 def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
-    """Records that alone have an effect; none where all have it."""
+    """Records, held-out ones among them, that alone have an effect; none where all have it."""
     if not isinstance(trial.own, OneRecord) or trial.own.own != name:
         return ()
-    return (trial.own.records[0].source or 'one record',)
+    return tuple(dict.fromkeys(r.source or 'one record' for r in trial.own.records))
 
 
 def _told(

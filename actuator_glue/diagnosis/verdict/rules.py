@@ -188,7 +188,7 @@ def against(
     if verdict not in ('missing-effect', 'unexplained') or not structure:
         return 'nothing is supported that could be added'
     if own:
-        return f'{", ".join(own)} acts in one record only'
+        return f'{", ".join(own)} does not act in all records'
     if not error.removed_ci[0] > 0.0:
         return 'the error that it removes in the held-out part does not exclude zero'
     return ''
