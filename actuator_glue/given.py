@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from io import IOBase
@@ -60,11 +61,11 @@ def one_thing(value: object) -> bool:
     A path is not its letters, a table not its columns, a mapping not its keys, an open file not
     its lines.
     """
-    return isinstance(value, (str, PathLike, Mapping, IOBase)) or hasattr(value, 'columns')
+    return isinstance(value, (str, bytes, PathLike, Mapping, IOBase)) or hasattr(value, 'columns')
 
 
 def path(value: object, name: str = 'path') -> Path:
-    """Return the path of a file or folder, whatever holds it.
+    """Return the path of a file or folder, whatever holds it; a `~` in front is the home folder.
 
     Args:
         value: what was given.
@@ -75,9 +76,20 @@ def path(value: object, name: str = 'path') -> Path:
     """
     of_kind(value, name, (str, PathLike), "the name of a file, as 'monday.npz'")
     try:
-        return Path(cast('str | PathLike[str]', value))
+        return Path(at_home(cast('str | PathLike[str]', value)))
     except TypeError:
         raise InputError(f'{name} is {_shown(value)}; give it as text') from None
+
+
+def at_home(text: str | PathLike[str]) -> str:
+    """Return a path with the home folder in place of a `~` in front; `~$test.csv` stays."""
+    text = os.fspath(text)
+    if not text.startswith('~'):
+        return text
+    try:
+        return str(Path(text).expanduser())
+    except RuntimeError:  # no home of that name
+        return text
 
 
 def of_kind(value: object, name: str, kinds: type | tuple[type, ...], wanted: str) -> None:

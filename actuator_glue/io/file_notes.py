@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.noted_rate import is_rate, plain, rate_of
 
 # What is understood, and what each is written as.
 NOTES = {
@@ -34,17 +35,22 @@ _STATED = {
         r'|interpolat\w*)\b.*|zero|first'
     ),
 }
+# A `Hold: 5 s` is that of a load; 0, 1 and `1st` may be the order of the command's.
+_HOLD_OF_A_LOAD = re.compile(
+    r'(?!.*(?:order|linear|[zf]oh))(?![01](?:\.0*)?$)(?!\d+(?:st|th)\b)[+-]?\d.*'
+    r'|none|off|no|n/?a|-*'
+)
 _TYPED = 0.85  # as alike as words are where a letter of a long one is missing or exchanged
 
 
 def note_of(name: str) -> str | None:
     """Return the name of `NOTES` that is written here, in capitals or small; None for no such."""
-    return _PLAIN.get(_plain(name))
+    return _PLAIN.get(plain(name))
 
 
 def nearly(name: str) -> bool:
     """Return whether a name is one of `NOTES`, or can only be meant for one."""
-    return note_of(name) is not None or _meant(name) is not None
+    return note_of(name) is not None or _meant(name) is not None or is_rate(name)
 
 
 def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
@@ -61,6 +67,8 @@ def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, value in notes.items():
         known, meant = note_of(name), _meant(name.removesuffix(':'))
+        if known is not None and not _ours(name, value):
+            continue
         sign = '' if name.endswith(':') else ' ='
         if known is None and meant is not None:
             raise InputError(
@@ -78,12 +86,13 @@ def stated(notes: Mapping[str, str]) -> dict[str, str]:
     return {
         name: notes[name]
         for name, meant in known.items()
-        if meant is not None and (meant not in _STATED or _is_stated(meant, notes[name]))
+        if rate_of(name, notes[name]) is not None
+        or (meant is not None and (meant not in _STATED or _is_stated(meant, notes[name])))
     }
 
 
 def of_groups(groups: Iterable[Mapping[str, str]]) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return what the groups of a file say alike, and a line for each of `NOTES` that differs.
+    """Return what the groups of a file say alike, and a line for each note that differs.
 
     Args:
         groups: names and values; what `stated` leaves out is none.
@@ -91,7 +100,7 @@ def of_groups(groups: Iterable[Mapping[str, str]]) -> tuple[dict[str, str], tupl
     said: dict[str, set[str]] = {}
     for group in groups:
         for name, value in stated(group).items():
-            said.setdefault(_PLAIN[_plain(name)], set()).add(value)
+            said.setdefault(note_of(name) or name, set()).add(value)
     told = tuple(
         f'its groups have different {name} ({", ".join(sorted(values))}), and none is taken; say '
         'which in a channel map'
@@ -118,13 +127,17 @@ def take_note(comment: str, notes: dict[str, str], where: str) -> bool:
 
 
 def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
-    """Add what a file says under a name; of names that are not understood the last counts.
+    """Add what a file says under a name; of what is not meant for us the last counts.
 
     Raises:
         InputError: one of `NOTES` is said twice, differently.
     """
-    if note_of(name) is not None and notes.get(name, value) != value:
-        raise InputError(f'{where}: {name} is said twice, {notes[name]!r} and {value!r}; keep one')
+    before = notes.get(name, value)
+    if _ours(name, before):
+        if not _ours(name, value):
+            return
+        if before != value:
+            raise InputError(f'{where}: {name} is said twice, {before!r} and {value!r}; keep one')
     notes[name] = value
 
 
@@ -132,7 +145,7 @@ def _states(name: str, value: str) -> bool:
     """Return whether a name with its value behind a colon is a note, right or nearly, no prose."""
     meant = _meant(name)
     if note_of(name) is not None or meant is None:
-        return note_of(name) is not None
+        return note_of(name) is not None or rate_of(name, value) is not None
     return _is_stated(meant, value)
 
 
@@ -140,14 +153,17 @@ def _is_stated(meant: str, value: str) -> bool:
     return _STATED[meant].fullmatch(value.strip().casefold()) is not None
 
 
-def _plain(name: str) -> str:
-    return re.sub(r'[\s-]+', '_', name.strip()).casefold()
+def _ours(name: str, value: str) -> bool:
+    """Return whether a name with its value is one of `NOTES`, and not the hold of a load."""
+    known = note_of(name)
+    another = known == 'hold' and _HOLD_OF_A_LOAD.fullmatch(value.strip().casefold())
+    return known is not None and not another
 
 
 def _meant(name: str) -> str | None:
-    plain = _plain(name)
+    words = plain(name)
     for known, pattern in _MEANT.items():
-        if pattern.fullmatch(plain) is not None:
+        if pattern.fullmatch(words) is not None:
             return known
-    near = difflib.get_close_matches(plain, ['stiffness_n_per_m'], 1, _TYPED)
+    near = difflib.get_close_matches(words, ['stiffness_n_per_m'], 1, _TYPED)
     return 'stiffness_N_per_m' if near else None

@@ -6,7 +6,6 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import cast
 
@@ -15,10 +14,11 @@ import numpy as np
 from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
-from actuator_glue.given import of_kind
+from actuator_glue.given import path as path_given
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
 from actuator_glue.io.file_notes import noted, stated
 from actuator_glue.io.formats import Column, FileTable, format_of
+from actuator_glue.io.noted_rate import noted_rate
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.units import (
@@ -40,6 +40,8 @@ _REST_SHARE = 0.1
 _OTHER_RATE = 1e-3
 # The end of `pos_m` or `cmd_in` may be no unit: whoever makes a channel map knows.
 _NO_UNIT = re.compile(r'_(?:\w|in)$')
+# A column that may be of times, though it is not called so in full.
+_CLOCK = re.compile(r'time|zeit|date|clock|stamp|^t\b', re.IGNORECASE)
 _ZARR = ('zarr.json', '.zgroup', '.zarray')  # files of a Zarr store, which is a folder
 _NEEDED = ('time', 'command', 'measured')
 
@@ -163,8 +165,7 @@ def channels_of(
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
     """
-    of_kind(path, 'file', (str, PathLike), 'the path of a file')
-    path = Path(path)
+    path = path_given(path, 'file')
     if not path.exists():
         raise InputError(f'{path}: there is no such file')
     refuse_pipe(path)
@@ -216,7 +217,11 @@ def _by_name(
     """
     table = format_of(path).read(path, None)
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
-    if table.period is not None:
+    period, told, said = table.period, [*table.told], noted_rate(table.notes)
+    if period is None and said is not None and not _may_hold_times(table):
+        period = 1.0 / said[1]
+        told.append(f'no column of times; {said[0]!r} is taken, as it says')
+    if period is not None:
         needed = tuple(role for role in needed if role != 'time')
     _refuse_unread(path, table, {*needed, 'force'})
     columns, motion = choose(labels, units, str(path), needed)
@@ -227,12 +232,47 @@ def _by_name(
         values = {
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
-    notes, period, start_ns = noted(table.notes, str(path)), table.period, table.start_ns
-    told = (*table.told, *_unscaled(table.columns[at] for at, _ in columns.values()))
+    notes, start_ns = noted(table.notes, str(path)), table.start_ns
+    told += [
+        *_unscaled(table.columns[at] for at, _ in columns.values()),
+        *_unlike_clock(table, values.get('time'), period),
+    ]
     if period is not None and 'time' in values:
         _check_period(period, values['time'], path)
     del raw, table  # a long file's columns as they were read are not held beside these
-    return values, notes, None if 'time' in values else period, start_ns, motion, told
+    return values, notes, None if 'time' in values else period, start_ns, motion, tuple(told)
+
+
+def stated_period(table: FileTable) -> float | None:
+    """Return the time between samples [s]: of waveforms, or by a note where no column tells it."""
+    said = noted_rate(table.notes)
+    by_note = None if said is None or _may_hold_times(table) else 1.0 / said[1]
+    return by_note if table.period is None else table.period
+
+
+def _may_hold_times(table: FileTable) -> bool:
+    """Whether a column may be of times, whatever it is called."""
+    return any(
+        _CLOCK.search(c.label) or (c.unit or written_unit(c.label)) in ROLES['time']
+        for c in table.columns
+    )
+
+
+def _unlike_clock(table: FileTable, time: Array | None, period: float | None) -> Iterator[str]:
+    """Yield where a note of a file states another sample rate than the clock that is taken."""
+    said, found, by = noted_rate(table.notes), None, 'channel map or waveform say'
+    if said is None:
+        return
+    note, rate = said
+    if time is not None:
+        found, by = rate_by_clock(np.arange(len(time)), time, rate), 'its column of times says'
+    elif period is not None and abs(period * rate - 1.0) > APART:
+        found = 1.0 / period
+    if found is not None:
+        yield (
+            f'it says {note!r}, and is taken at {found:.6g} Hz, as {by}; mend the one that is '
+            'wrong'
+        )
 
 
 def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
@@ -278,6 +318,7 @@ def _mapped(
     if channels.rate is not None:
         _check_rate(channels.rate, values.get('time'), table, path)
     period = None if channels.rate is None else 1.0 / channels.rate
+    told = (*told, *_unlike_clock(table, values.get('time'), period))
     return values, notes, period, table.start_ns, channels.motion, told
 
 

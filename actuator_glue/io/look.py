@@ -13,6 +13,7 @@ from actuator_glue.io.bag_reader import is_bag
 from actuator_glue.io.bag_topics import Stamps, TopicSeries, topic_series
 from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
+from actuator_glue.io.laboratory import stated_period
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.text_layout import SampleRows, text_layout
 from actuator_glue.io.units import symbol, written_unit
@@ -163,4 +164,4 @@ def _file(path: Path) -> FileLook:
         for c, i, v in zip(named, places, table.values(places), strict=True)
         if len(v) > 1
     ]
-    return FileLook(path, looks, layout, table.period, chosen.name, tuple(blocks))
+    return FileLook(path, looks, layout, stated_period(table), chosen.name, tuple(blocks))

@@ -139,6 +139,26 @@ def test_beside_a_channel_map_the_hold_of_a_load_is_prose(tmp_path: Path) -> Non
         read(path, channels=parse_channel_map(MAP, 'a map'))
 
 
+@pytest.mark.parametrize('sign', [':', ' ='])
+@pytest.mark.parametrize(
+    'value', ['5 s', '5', '30 min at each level', '10 kN', '2.5 mm', '3 cycles', 'none', '']
+)
+def test_the_hold_of_a_load_is_none_of_the_command(tmp_path: Path, value: str, sign: str) -> None:
+    """It refused a good file; beside it the hold of the command counts, in any order."""
+    said, ours = f'# Hold{sign} {value}', '# hold = linear'
+    assert read(text(tmp_path / 'a.csv', said)).hold == 'zoh'
+    for lines in ((said, ours), (ours, said), (said.replace('H', 'h'), ours)):
+        assert read(text(tmp_path / 'a.csv', *lines)).hold == 'linear'
+
+
+@pytest.mark.parametrize(
+    'value', ['1', '0', '1st', '1st order', 'foh', 'linaer', '2 points, linear', 'yes', 'held']
+)
+def test_what_may_be_the_hold_of_the_command_is_refused(tmp_path: Path, value: str) -> None:
+    with pytest.raises(InputError, match='it says that its hold is'):
+        read(text(tmp_path / 'a.csv', f'# Hold: {value}'))
+
+
 @pytest.mark.parametrize('holds', [('5.0',), ('5.0', '10.0')])
 def test_the_hold_of_a_load_in_a_group_is_none(tmp_path: Path, holds: tuple[str, ...]) -> None:
     told: list[str] = []

@@ -55,6 +55,48 @@ def check(path: Path, *, force: bool = True) -> None:
         np.testing.assert_allclose(record.force, FORCE)
 
 
+def shown(kind: str) -> str:
+    """Return the channels as pandas prints them, all rows."""
+    frame = pd.DataFrame(dict(zip(NAMES, COLUMNS, strict=True)))
+    blanks = ['Time [s]', 'Command [mm]', 'Measured [mm]', 'Force [N]']
+    frames = {
+        'numbers in front': frame,
+        'from another row on': frame.set_axis(range(1000, 1000 + COUNT)),
+        'every other number': frame.set_axis(range(0, 2 * COUNT, 2)),
+        'a name of the index': frame.rename_axis('row'),
+        'times as index': frame.set_index('time_s'),
+        'other names in front': frame[['command_mm', 'time_s', 'measured_mm', 'force_N']],
+        'a column that counts': frame.assign(sample=range(COUNT))[['sample', *NAMES]],
+        'blanks in names': frame.set_axis(blanks, axis='columns'),
+    }
+    return frames[kind].to_string()
+
+
+SHOWN = ['numbers in front', 'from another row on', 'every other number', 'a name of the index']
+SHOWN += ['times as index', 'other names in front', 'a column that counts', 'blanks in names']
+
+
+@pytest.mark.parametrize('end', ['', '\n', '\r\n'])
+@pytest.mark.parametrize('kind', SHOWN)
+def test_what_pandas_prints_is_read(tmp_path: Path, kind: str, end: str) -> None:
+    """`DataFrame.to_string()`: names end above their numbers, the index has none."""
+    text = shown(kind).replace('\n', end or '\n') + end
+    (tmp_path / 'a.txt').write_bytes(text.encode())
+    check(tmp_path / 'a.txt')
+
+
+def test_numbers_that_do_not_stand_below_the_names_are_refused(tmp_path: Path) -> None:
+    """One name less than numbers, and nothing tells which has none."""
+    head, *rows = shown('numbers in front').splitlines()
+    for wrong in (head.strip(), head[2:]):
+        (tmp_path / 'a.txt').write_text('\n'.join([wrong, *rows]) + '\n')
+        with pytest.raises(InputError, match='4 names, but 5 entries'):
+            read(tmp_path / 'a.txt')
+    (tmp_path / 'a.txt').write_text('\n'.join([head, *rows[:9], '..     ...', *rows[-9:]]) + '\n')
+    with pytest.raises(InputError, match=r'line 11 is of dots: rows are left out'):
+        read(tmp_path / 'a.txt')
+
+
 @st.composite
 def written(draw: st.DrawFn) -> tuple[str, str, str, list[str]]:
     """Return a text, its delimiter, its decimal sign and the names in its first line."""

@@ -17,6 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.file_notes import take_note
 from actuator_glue.io.formats import Column, FileTable, Format
+from actuator_glue.io.noted_rate import take_rate
 from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import EXAMPLE, bare, is_unit, kinds_line, units_line
 from actuator_glue.records import Array
@@ -77,7 +78,7 @@ class TextHead:
         units: of the columns, where a line below the names holds them.
         lines: lines before the first sample.
         delimiter: text between columns, None for blanks.
-        notes: `# name = value` lines, `# name: value` if nearly one of `NOTES`.
+        notes: `# name = value` lines; `# name: value` if nearly one of `NOTES`, or a sample rate.
         decimal: decimal sign of the samples.
         width: entries of a row.
         least: entries that a row has at least; the last ones may be remarks, and left out.
@@ -135,35 +136,27 @@ def read_head(
         broken = (i for i in firsts if _broken(top[i:header_lines]))
         line = ' '.join(top[next(broken, max(header_lines - 1, 0)) : header_lines])
         line = uncommented(line)
-        for above in filter(_COMMENT.match, top[:header_lines]):
-            take_note(uncommented(above), notes, str(path))
-    below, by = header_lines, delimiter
-    while line and not units and below < len(top):
-        text, below = uncommented(top[below]), below + 1
-        by = delimiter or _of_units(line, text)
-        entries = fields_of(text, by)
-        units = units_line(entries)
-        # A number behind a `#` may be that of a sample.
-        row = len(entries) == len(fields_of(line, by)) and sum(map(is_number, entries)) > 1
-        if units or (_COMMENT.match(top[below - 1]) and not row):
-            take_note(text, notes, str(path))
-            header_lines = below
-        elif text.strip(_NOTHING):
-            break
+        for above in top[:header_lines]:
+            if _COMMENT.match(above):
+                take_note(uncommented(above), notes, str(path))
+            else:
+                take_rate(above, notes)
+    if line and not units:
+        header_lines, line, units = _below_names(path, top, header_lines, line, delimiter, notes)
     if units and header_lines < len(top):
-        kinds = fields_of(top[header_lines], by)
-        if len(kinds) == len(units) and kinds_line(kinds):
-            header_lines += 1
+        kinds = fields_of(top[header_lines], delimiter or _of_units(line, top[header_lines]))
+        header_lines += len(kinds) == len(units) and kinds_line(kinds)
     rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
     if delimiter is None:
         delimiter = _best_delimiter(line, rows[0])
     table = [fields_of(row, delimiter) for row in rows]
+    _refuse_left_out(path, top, header_lines)
     widths = {len(row) for row in table}
     names = _names(line, delimiter, widths)
     width = max(widths)
     if len(names) in widths or all(map(_REMARKS.search, names[width:] or [''])):
         width = len(names)
-    aligned = names if len(names) == width else _aligned(names, table, rows)
+    aligned = names if len(names) == width else _aligned(names, table, rows, line)
     least = _least_width(aligned, table, width)
     if aligned and not aligned[0] and len(units) == width - 1:
         units = ['', *units]
@@ -175,6 +168,20 @@ def read_head(
     return TextHead(
         aligned, units, header_lines, delimiter, notes, sign, width, least, len(names), stamps
     )
+
+
+def _refuse_left_out(path: Path, top: list[str], header_lines: int) -> None:
+    """Refuse a table as it is printed when it is long.
+
+    Raises:
+        InputError: dots stand for rows.
+    """
+    for number, text in enumerate(top[header_lines:], header_lines + 1):
+        if set(text) <= {'.', ' '} and '..' in text:
+            raise InputError(
+                f'{path}: line {number} is of dots: rows are left out there; save all of them, '
+                'for instance with `to_csv` or `to_string` of pandas'
+            )
 
 
 def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[str, str]]:
@@ -204,6 +211,36 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
         )
     # Numbers are no names but the first sample; numpy.savetxt puts names behind a `#`.
     return at, line, notes
+
+
+def _below_names(
+    path: Path,
+    top: list[str],
+    at: int,
+    line: str,
+    delimiter: str | None,
+    notes: dict[str, str],
+) -> tuple[int, str, list[str]]:
+    """Return the lines before samples, the line of names, and the units below it."""
+    for below in range(at, len(top)):
+        text = uncommented(top[below])
+        by = delimiter or _of_units(line, text)
+        entries = fields_of(text, by)
+        if units := units_line(entries):
+            return below + 1, line, units
+        numbers, first = sum(map(is_number, entries)), text.rstrip()
+        # A number behind a `#` may be that of a sample.
+        if _COMMENT.match(top[below]) and (
+            numbers < 2 or len(entries) != len(fields_of(line, by))
+        ):
+            take_note(text, notes, str(path))
+            at = below + 1
+        elif first and not numbers and not line[: len(first)].strip():
+            # pandas writes the name of the index below the others.
+            return below + 1, first + line[len(first) :], []
+        elif text.strip(_NOTHING):
+            break
+    return at, line, []
 
 
 def _broken(lines: list[str]) -> bool:
@@ -270,14 +307,18 @@ def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
     return names
 
 
-def _aligned(names: list[str], table: list[list[str]], rows: list[str]) -> list[str]:
+def _aligned(names: list[str], table: list[list[str]], rows: list[str], line: str) -> list[str]:
     """Return a name for each entry of rows with one entry more than names; nothing if unclear.
 
     The extra entry is a running number without a name in front, as R and pandas write it, or an
-    empty entry behind a delimiter that ends each row.
+    empty entry behind a delimiter that ends each row. Where they print a table, each name ends
+    above its numbers.
     """
     if not names or any(len(row) != len(names) + 1 for row in table):
         return []
+    ends = _ends(line, names)
+    if ends and all(_ends(*row)[1:] == ends for row in zip(rows, table, strict=True)):
+        return ['', *names]
     counts = len(table) > 1 and all(row[0].isdecimal() for row in table)
     if counts:
         first = int(table[0][0])
@@ -289,6 +330,18 @@ def _aligned(names: list[str], table: list[list[str]], rows: list[str]) -> list[
     if counts and (not own or all(map(_QUOTED_FIRST.match, rows))):
         return ['', *names]
     return []
+
+
+def _ends(line: str, entries: list[str]) -> list[int]:
+    """Return where each entry of a line ends; nothing where more than blanks part them."""
+    at, found = 0, []
+    for entry in entries:
+        start = line.find(entry, at)
+        if start < 0 or line[at:start].strip():
+            return []
+        at = start + len(entry)
+        found.append(at)
+    return found
 
 
 def _least_width(names: list[str], table: list[list[str]], width: int) -> int:

@@ -23,6 +23,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.file_notes import add_note, stated, take_note
 from actuator_glue.io.formats import Column, FileTable, Format, library, reading
+from actuator_glue.io.noted_rate import take_rate
 from actuator_glue.io.units import bare, units_line
 from actuator_glue.records import Array
 
@@ -188,6 +189,7 @@ def _notes(rows: list[tuple[Any, ...]], path: Path) -> dict[str, str]:
             take_note(filled[0].lstrip('# '), said, str(path))
         for name, value in stated(said).items():
             add_note(notes, name, value, str(path))
+        take_rate('\t'.join(filled).lstrip('# '), notes)
     return notes
 
 

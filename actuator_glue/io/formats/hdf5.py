@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import NOTES, nearly, note_of, of_groups
+from actuator_glue.io.file_notes import NOTES, nearly, of_groups
 from actuator_glue.io.formats import (
     A_REMARK,
     MOST_COLUMNS,
@@ -25,6 +25,7 @@ from actuator_glue.io.formats import (
     matrix_columns,
     reading,
 )
+from actuator_glue.io.noted_rate import is_rate
 from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.waveforms import (
     PROPERTIES,
@@ -136,7 +137,7 @@ class _Tree:
 
     def visit(self, name: str, found: Any) -> None:
         """Take what lies under a name; MATLAB's own group `#refs#` is left out."""
-        self.groups.append({n: _plain(found.attrs[n]) for n in found.attrs if note_of(n)})
+        self.groups.append({n: _plain(found.attrs[n]) for n in found.attrs if nearly(n)})
         if not name.startswith('#') and hasattr(found, 'shape'):
             self._take(name, found, name.replace('/', '.') if self._matlab else name, 0)
 
@@ -144,6 +145,8 @@ class _Tree:
         # Links to other files are never followed, external storage is never opened.
         if dataset.is_virtual or dataset.external or len(self.columns) > MOST_COLUMNS:
             return
+        if dataset.shape == ():
+            self._note(dataset, shown)
         if not dataset.shape or _EMPTY in dataset.attrs:
             return  # what MATLAB stores of [] is its shape
         if dataset.size <= 1000:
@@ -174,7 +177,7 @@ class _Tree:
 
     def _note(self, dataset: Any, shown: str) -> None:
         label = shown.replace('/', '.').rpartition('.')[2]
-        if label in NOTES:
+        if label in NOTES or (is_rate(label) and dataset.size == 1):
             self.notes[label] = _text(dataset)
         if _is_text(dataset):
             self.texts[shown] = _text(dataset)

@@ -26,6 +26,7 @@ from actuator_glue.io.formats import (
 from actuator_glue.io.formats.hdf5 import has_objects, is_hdf5, named_by_structs, read_tree
 from actuator_glue.io.matlab_elements import check_elements
 from actuator_glue.io.matlab_objects import check_clocks, read_objects
+from actuator_glue.io.noted_rate import is_rate
 from actuator_glue.io.signature import is_text, refuse_foreign
 from actuator_glue.io.units import bare
 from actuator_glue.records import Array
@@ -89,8 +90,9 @@ def _plain(content: dict[str, Any]) -> FileTable:
     named = ((name.rpartition('.')[2], text) for name, text in texts.items())
     notes = {name: text for name, text in named if name in NOTES}
     for name, array in arrays.items():
-        if name.rpartition('.')[2] == 'stiffness_N_per_m' and array.size == 1:
-            notes['stiffness_N_per_m'] = repr(float(array.flat[0]))
+        label = name.rpartition('.')[2]
+        if (label == 'stiffness_N_per_m' or is_rate(label)) and array.size == 1:
+            notes[label] = repr(float(array.flat[0]))
 
     def values(wanted: list[int]) -> list[Array]:
         chosen = [places[at] for at in wanted]

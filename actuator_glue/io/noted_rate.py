@@ -1,0 +1,74 @@
+"""The sample rate that a file states beside its columns: `sample rate: 1024 Hz`, `dt = 1 ms`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from actuator_glue.records import FASTEST_RATE, SLOWEST_RATE
+
+# A sample rate as people write it, with its unit in the name or behind the value: Hz without one.
+_RATE = re.compile(
+    r'(?:sampl(?:e|es|ing)_?(?:rate|freq(?:uency)?)|samples_per_second|abtast(?:rate|frequenz)|f_?s)'
+    r'(?:_?[\[(]?(?P<unit>k?hz)[\])]?)?'
+)
+_STEP = re.compile(
+    r'(?:sampl(?:e|ing)_?(?:interval|period)|time_?step|delta_?t|dt)'
+    r'(?:_?[\[(]?(?P<unit>[mun]?s)[\])]?)?'
+)
+_SIZE = re.compile(
+    r'(?P<size>\d+(?:\.\d+)?(?:e[+-]?\d+)?)\s*(?P<unit>k?hz|hertz|sps|s/s|samples/s|[mun]?s)?'
+)
+_HERTZ = {'': 1.0, 'hz': 1.0, 'hertz': 1.0, 'sps': 1.0, 's/s': 1.0, 'samples/s': 1.0, 'khz': 1e3}
+_SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
+
+
+def noted_rate(notes: Mapping[str, str]) -> tuple[str, float] | None:
+    """Return what a file says of its sample rate, as it is written there, and the rate [Hz].
+
+    None where it says nothing of it, or two different things.
+    """
+    found = {
+        rate: (f'{name}{"" if name.endswith(":") else " ="} {value}', rate)
+        for name, value in notes.items()
+        if (rate := rate_of(name.removesuffix(':'), value)) is not None
+    }
+    return found.popitem()[1] if len(found) == 1 else None
+
+
+def take_rate(line: str, notes: dict[str, str]) -> None:
+    """Add what a line that is no comment says of the sample rate: `Sample rate,1024,Hz`."""
+    name, *behind = re.split(r'[:=,;\t]', line.replace('"', ''), maxsplit=1)
+    value = ' '.join(re.split(r'[\s,;]+', ''.join(behind).strip(' \t,;')))
+    if rate_of(name, value) is not None:
+        notes[f'{name.strip()}:'] = value
+
+
+def is_rate(name: str) -> bool:
+    """Return whether a name says that a sample rate, or the time between samples, is given."""
+    return any(pattern.fullmatch(plain(name)) for pattern in (_RATE, _STEP))
+
+
+def rate_of(name: str, value: str) -> float | None:
+    """Return the sample rate that a name and its value state [Hz].
+
+    None for another note, a rate that no test here has, and a time between samples without a unit.
+    """
+    size = _SIZE.fullmatch(value.strip().casefold())
+    rate, step = (pattern.fullmatch(plain(name)) for pattern in (_RATE, _STEP))
+    said = rate or step
+    if size is None or said is None:
+        return None
+    unit = size['unit'] or said['unit'] or ''
+    if unit in _SECONDS and float(size['size']) > 0.0:
+        found = 1.0 / (float(size['size']) * _SECONDS[unit])
+    elif unit in _HERTZ and rate is not None:
+        found = float(size['size']) * _HERTZ[unit]
+    else:
+        return None
+    return found if SLOWEST_RATE <= found <= FASTEST_RATE else None
+
+
+def plain(name: str) -> str:
+    """Return a name in small letters, `_` for blanks and dashes."""
+    return re.sub(r'[\s-]+', '_', name.strip()).casefold()
