@@ -11,10 +11,12 @@ from actuator_glue.si import FORCE, LENGTH
 _TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'µs': 1e-6, 'μs': 1e-6}
 _TIME |= dict.fromkeys(('sec', 'Sec', 'SEC', 'second', 'seconds', 'Seconds'), 1.0)
 _TIME |= dict.fromkeys(('msec', 'mSec', 'milliseconds'), 1e-3)
+# Within other names these are words (`Load min`) and letters.
+_LONG = {'min': 60.0, 'h': 3600.0, 'hr': 3600.0}
 
 # What a column can be, and factors to SI by unit.
 ROLES: dict[str, dict[str, float]] = {
-    'time': _TIME,
+    'time': _TIME | _LONG,
     'command': LENGTH,
     'measured': LENGTH,
     'force': FORCE | {'lb': FORCE['lbf']},
@@ -47,7 +49,7 @@ _WHOLE = re.compile(r'^[\[(]+\s*([^\[\]()]*?)\s*[\])]+$')  # all in brackets
 _OF_MATRIX = re.compile(r'\((?::,\d+|\d+,:)\)\s*$')  # which column of a matrix, as MATLAB says it
 _MOVING = ('command', 'measured')
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
-_KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values())
+_KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values()) - set(_LONG)
 _LOWER = {unit.lower() for unit in _KNOWN}
 # What each unit is of, and its size there; of others than these only the spelling tells.
 _SIZES = {unit: (unit, 1.0) for unit in _KNOWN} | MOTIONS
@@ -77,6 +79,8 @@ _WORDS = {
     'millisecond': 'ms',
     'microsecond': 'us',
     'nanosecond': 'ns',
+    'minute': 'min',
+    'hour': 'h',
     'degree': 'deg',
     'radian': 'rad',
     'milliradian': 'mrad',
@@ -96,6 +100,9 @@ _WORDS = {
     'sekunden': 's',
     'millisekunde': 'ms',
     'millisekunden': 'ms',
+    'minuten': 'min',
+    'stunde': 'h',
+    'stunden': 'h',
     'zoll': 'in',
     'grad': 'deg',
     'prozent': '%',
@@ -322,7 +329,7 @@ def units_line(entries: list[str]) -> list[str]:
 
     Each entry is a unit, in brackets or not, empty, or a dash; at least one unit is known here.
     """
-    known = ANGLES.union(*ROLES.values())
+    known = ANGLES.union(*ROLES.values()) - set(_LONG)
     units = [_WHOLE.sub(r'\1', entry.strip()) for entry in entries]
     short = all(len(u) <= 12 and not _is_number(u) for u in units)
     return units if short and any(symbol(u) in known for u in units) else []

@@ -29,6 +29,40 @@ def table(path: Path, names: list[str], by: str = ',') -> Path:
 
 
 @pytest.mark.parametrize(
+    ('head', 'seconds'),
+    [
+        ('time (min),command_mm,measured_mm', 60.0),
+        ('time_min,command_mm,measured_mm', 60.0),
+        ('Time [Minutes],command_mm,measured_mm', 60.0),
+        ('time,command,measured\nmin,mm,mm', 60.0),
+        ('time (h),command_mm,measured_mm', 3600.0),
+        ('time_hours,command_mm,measured_mm', 3600.0),
+        ('t [min],cmd [mm],pos [mm]', 60.0),
+        ('Zeit [min],Sollweg [mm],Istweg [mm]', 60.0),
+    ],
+)
+def test_times_in_minutes_and_hours(tmp_path: Path, head: str, seconds: float) -> None:
+    """Both wanted a `scale`; where the names say no roles, `map` proposes the unit."""
+    path = tmp_path / 'a.csv'
+    rows = np.column_stack([TIME / seconds, COMMAND, MEASURED])
+    np.savetxt(path, rows, fmt='%.12f', delimiter=',', header=head, comments='')
+    if not head.lower().startswith('time'):
+        assert main(['map', str(path), '--out', str(tmp_path / 'map.yaml')]) == 0
+        assert 'unit: "min"' in (tmp_path / 'map.yaml').read_text()
+        assert read(path, channels=tmp_path / 'map.yaml').period == 1e-3
+    else:
+        assert read(path).period == 1e-3
+
+
+def test_a_line_of_statistics_is_no_line_of_units(tmp_path: Path) -> None:
+    """`min` and `max` name columns there, and what stands above them does not."""
+    head = 'Position,,Force\nmin,max,mean\n'
+    rows = ''.join(f'{i},{2 * i},{3 * i}\n' for i in range(50))
+    (tmp_path / 'a.csv').write_text(head + rows)
+    assert [c.label for c in look(tmp_path / 'a.csv').columns] == ['min', 'max', 'mean']
+
+
+@pytest.mark.parametrize(
     'form', ['{}_{}', '{} [{}]', '{}/{}', '{} / {}', '{} in {}', '{} ({})', '{}; {}', '{} {}']
 )
 def test_every_way_to_write_a_unit(tmp_path: Path, form: str) -> None:
@@ -52,6 +86,8 @@ def test_every_way_to_write_a_unit(tmp_path: Path, form: str) -> None:
         ('command_ft', 'ft'),
         ('time_min', 'min'),
         ('Load min', ''),
+        ('disp_h', ''),
+        ('t [h]', 'h'),
         ('Disp amp', ''),
         ('Axial Strain', ''),
         ('cmd_ft', 'ft'),
