@@ -68,7 +68,8 @@ def run(args: argparse.Namespace) -> int:
         _write(Path(args.out), text)
         say(f'{args.out}: written; check it, then `info {args.file} --channels {args.out}`', args)
     if plain:
-        say(f'{args.file} needs no channel map: it is read as it is', args)
+        lost = ', without a force' if _leaves_force(found, proposal) and not ours else ''
+        say(f'{args.file} needs no channel map: it is read as it is{lost}', args)
     if refused and (text or not plain):
         note(refused)
     content = {
@@ -76,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
         'path': str(args.file),
         'columns': [_describe(column) for column in found.columns],
         'channels': {role: _reasons(guess) for role, guess in proposal.channels.items()},
+        'forces': [_reasons(guess) for guess in proposal.forces],
         'map': text or None,
         'needed': not plain,
         'works': not refused,
@@ -101,11 +103,18 @@ def map_text(found: FileLook, proposal: ProposedMap) -> str:
     if proposal.counter is not None:
         lines.append(f'sample_number: {_quoted(proposal.counter.name)}  # goes up by one')
     for role, guess in proposal.channels.items():
-        scale = f', scale: {guess.scale:g}' if guess.scale != 1.0 else ''
-        entry = f'{{column: {_quoted(guess.column.name)}, unit: {_quoted(guess.unit)}{scale}}}'
-        lines.append(f'{role}: {entry}  # {"; ".join(guess.reasons)}')
+        lines.append(_entry(role, guess))
         lines += [f'#   CHECK {what}' for what in guess.unsure]
+    if proposal.forces:
+        lines.append('#   CHECK force: none of these is taken; uncomment the one that is meant')
+        lines += [f'# {_entry("force", guess)}' for guess in proposal.forces]
     return '\n'.join(lines) + '\n'
+
+
+def _entry(role: str, guess: Guess) -> str:
+    scale = f', scale: {guess.scale:g}' if guess.scale != 1.0 else ''
+    entry = f'{{column: {_quoted(guess.column.name)}, unit: {_quoted(guess.unit)}{scale}}}'
+    return f'{role}: {entry}  # {"; ".join(guess.reasons)}'
 
 
 def _quoted(value: str | int) -> str:
@@ -124,6 +133,14 @@ def _fault(path: str, text: str | None, tell: Callable[[str], None]) -> str:
     except InputError as error:
         return f'with this map the file is refused: {error}'
     return ''
+
+
+def _leaves_force(found: FileLook, proposal: ProposedMap) -> bool:
+    """Whether a column may be the force, and none is called so, as it is where it is read."""
+    from actuator_glue.io.units import bare
+
+    guessed = proposal.forces or 'force' in proposal.channels
+    return bool(guessed) and all(bare(column.label) != 'force' for column in found.columns)
 
 
 def _missing(found: FileLook, proposal: ProposedMap) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.even_times import uneven
 from actuator_glue.io.look import ColumnLook, FileLook
-from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES, contradict, written_unit
+from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES, bare, contradict, written_unit
 from actuator_glue.motion import MOTIONS, TORQUES
 from actuator_glue.records import FASTEST_RATE, SLOWEST_RATE, Array
 from actuator_glue.velocity_command import is_velocity
@@ -71,6 +71,7 @@ class ProposedMap:
         rate: samples per second, where no column holds times.
         other_commands: names of columns that are commands, but of no displacement.
         integrated: a command of velocity or of a valve, and what follows its integral.
+        forces: guesses, each of which may be the force; none is chosen where there are several.
     """
 
     channels: dict[str, Guess]
@@ -78,6 +79,7 @@ class ProposedMap:
     rate: float | None
     other_commands: tuple[str, ...] = ()
     integrated: tuple[ColumnLook, ColumnLook] | None = None
+    forces: tuple[Guess, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -104,13 +106,17 @@ def propose(found: FileLook, given: float | None = None) -> ProposedMap:
     rate = given or _rate(found, rest, clock)
     # Without a rate a lag is told in samples.
     channels = _displacements(rest, rate or 1.0)
-    channels = _with_force(channels, rest)
+    forces = _forces(channels, rest)
+    if len(forces) == 1:
+        channels = {**channels, 'force': forces[0]}
+        forces = ()
     if clock is not None:
         channels = {'time': clock, **channels}
     others = [c for c in rest if _called(c, 'command') and not _may_be(c, 'command')]
     told = tuple(c.label.strip() for c in others)
     integrated = _integrated(rest, channels, rate or 1.0)
-    return ProposedMap(channels, counter, None if clock is not None else rate, told, integrated)
+    rate_told = None if clock is not None else rate
+    return ProposedMap(channels, counter, rate_told, told, integrated, forces)
 
 
 def _integrated(
@@ -334,21 +340,22 @@ def _pair(
     return chosen
 
 
-def _with_force(chosen: dict[str, Guess], columns: list[ColumnLook]) -> dict[str, Guess]:
-    """Add the only column that is called a force, or else the only one that has a unit of it."""
+def _forces(chosen: dict[str, Guess], columns: list[ColumnLook]) -> tuple[Guess, ...]:
+    """Return the one column that is called a force or has a unit of it; or all that may be it."""
     free = [c for c in columns if all(c is not guess.column for guess in chosen.values())]
     free = [c for c in free if _may_be(c, 'force')]
     named = [c for c in free if _called(c, 'force')]
     units = [c for c in free if c.unit in ROLES['force']]
-    if len(named) == 1:
-        column, reason = named[0], (f'called {named[0].label.strip()!r}',)
-        turns = 'measured' in chosen and chosen['measured'].unit in ANGLES
-        if turns and column.unit in TORQUES:
-            return {**chosen, 'force': Guess(column, column.unit, reason)}
-        return {**chosen, 'force': _guess(column, 'force', reason)}
-    if len(units) == 1:
-        return {**chosen, 'force': _guess(units[0], 'force', (f'its unit is {units[0].unit}',))}
-    return chosen
+    called = [c for c in named if bare(c.label) == 'force']
+    found = next((some for some in (called, named, units) if len(some) == 1), units or named)
+    turns = 'measured' in chosen and chosen['measured'].unit in ANGLES
+    guesses = []
+    for c in found:
+        own = _called(c, 'force')
+        reason = (f'called {c.label.strip()!r}' if own else f'its unit is {c.unit}',)
+        torque = turns and c.unit in TORQUES
+        guesses.append(Guess(c, c.unit, reason) if torque else _guess(c, 'force', reason))
+    return tuple(guesses)
 
 
 def _unsure(guess: Guess, what: tuple[str, ...]) -> Guess:

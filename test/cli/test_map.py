@@ -54,6 +54,42 @@ def test_a_rate_that_the_clock_contradicts_is_no_answer(
     assert looked(tmp_path, path)['works']
 
 
+def test_several_forces_are_shown_and_none_is_guessed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing was said of them; a line of the map that is uncommented takes one."""
+    command, measured, force = channels()
+    columns = [TIME, command, measured, force, 2.0 * force]
+    head = 'time_s,command_mm,measured_mm,Load cell 1 (kN),Load cell 2 (kN)'
+    path, out = write(tmp_path / 'a.csv', head, columns), tmp_path / 'map.yaml'
+    found = looked(tmp_path, path, '--out', str(out))
+    assert [guess['column'] for guess in found['forces']] == head.split(',')[3:]
+    assert 'is read as it is, without a force' in capsys.readouterr().out
+    text = out.read_text()
+    assert '#   CHECK force: none of these is taken' in text
+    assert load_records(path, channels=out)[0].force is None
+    out.write_text(text.replace('# force: {column: "Load cell 2', 'force: {column: "Load cell 2'))
+    (record,) = load_records(path, channels=out)
+    assert record.force is not None
+    np.testing.assert_allclose(record.force, 2e3 * force, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ('names', 'taken'),
+    [
+        ('Force (kN),Force rate (kN/s)', 'Force (kN)'),
+        ('force_N,Load cell 1 (kN)', 'force_N'),
+        ('Load cell (kN),Load mode', 'Load cell (kN)'),
+    ],
+)
+def test_one_force_among_others_is_taken(tmp_path: Path, names: str, taken: str) -> None:
+    command, measured, force = channels()
+    head = f'time_s,command_mm,measured_mm,{names}'
+    path = write(tmp_path / 'a.csv', head, [TIME, command, measured, force, 2.0 * force])
+    found = looked(tmp_path, path)
+    assert (found['channels']['force']['column'], found['forces']) == (taken, [])
+
+
 @pytest.mark.parametrize('seed', range(4))
 def test_channels_without_names_are_told_by_what_they_do(tmp_path: Path, seed: int) -> None:
     """The one that follows is measured; the proposal reads the file; a force is not guessed."""
