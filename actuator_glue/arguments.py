@@ -7,9 +7,10 @@ import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import at_home
 
 # What a campaign keeps in its folder of the kind that others write there as summaries.
 CAMPAIGN_FILES = ('campaign.json', 'progress.json')
@@ -83,11 +84,19 @@ def given(args: argparse.Namespace, option: str) -> bool:
     return value is not None and value is not False and value != []
 
 
-class Input(str):
+class _Path(str):
+    """A path; of `--out=~/a.csv` shells leave the home folder to the program."""
+
+    def __new__(cls, given: str) -> Self:
+        """Return the path with the home folder in full."""
+        return super().__new__(cls, at_home(given))
+
+
+class Input(_Path):
     """A file, bag or folder that a command reads."""
 
 
-class Output(str):
+class Output(_Path):
     """A file or bag that a command writes; `-` is standard output."""
 
 

@@ -63,8 +63,8 @@ def picture() -> None:
     clamped, free, earthquake = records()
     figure = style.new_figure(3.2)
     left, right = figure.subplots(1, 2)
-    draw(left, ag.diagnose([clamped], earthquake), 'one record, k = 250 kN/m')
-    draw(right, ag.diagnose([clamped, free], earthquake), 'the same and one with k = 0')
+    draw(left, ag.diagnose([clamped], holdout=earthquake), 'one record, k = 250 kN/m')
+    draw(right, ag.diagnose([clamped, free], holdout=earthquake), 'the same and one with k = 0')
     style.save(figure, PICTURE)
 
 

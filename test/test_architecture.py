@@ -66,7 +66,7 @@ ARROWS = {
     'normal': {'jit'},
     'json_value': set(),
     'optional_library': {'errors'},
-    'arguments': {'errors'},
+    'arguments': {'errors', 'given'},
     'plain_yaml': {'errors'},
     'model': BOTTOM,
     'effects': BOTTOM | {'model', 'plain_yaml'},

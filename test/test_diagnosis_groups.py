@@ -104,7 +104,7 @@ def test_tests_that_were_given_to_hold_out_are_predicted_too() -> None:
     fast = ag.Command('noise', rate=1000.0, duration=14.0, high=5.0, seed=4)
     record = ag.simulate(fast, stiffness=250e3, hold='linear', seed=(5, 3))
     parts = [replace(record.slice(7000 * i, 7000 * (i + 1)), hold='zoh') for i in (0, 1)]
-    found = ag.diagnose(parts[0], parts[1], effort=0.05, jobs=1)
+    found = ag.diagnose(parts[0], holdout=parts[1], effort=0.05, jobs=1)
     assert found.sampling[0]['fitted_rate_hz'] < 500.0
     data = found.inference_data
     assert data.posterior_predictive.attrs['held_out'] == [0, 1]

@@ -1,5 +1,6 @@
 """Paths and numbers of every usual type are taken by every public function, or refused by name."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
@@ -16,6 +17,7 @@ import actuator_glue as ag
 from actuator_glue.api.calibration_options import CalibrationOptions as _Calibration
 from actuator_glue.api.diagnosis import DiagnosisOptions as _Diagnosis
 from actuator_glue.api.given import records_given
+from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
 
 # What numpy's numbers and paths of others are to a type checker is not what is asked here.
@@ -102,7 +104,7 @@ def test_diagnose_takes_files(
     age = timedelta(hours=1)
     other = replace(posterior, sketches=())  # as if of another test
     with pytest.raises(InterruptedError):
-        api.diagnose([str(file)], Named(file), seed=None, prior=other, prior_age=age)
+        api.diagnose([str(file)], holdout=Named(file), seed=None, prior=other, prior_age=age)
     for (given,) in (seen['records'], seen['held']):
         np.testing.assert_array_equal(given.measured, record.measured)
     assert type(seen['seed']) is int and seen['before'].prior.age_s == 3600.0
@@ -111,9 +113,9 @@ def test_diagnose_takes_files(
         api.Command('noise', rate=100, duration=6, high=5), stiffness=250e3, seed=4
     )
     with pytest.raises(InputError, match='holds the same samples'):
-        api.diagnose(record, file)
+        api.diagnose(record, holdout=file)
     with pytest.raises(InputError, match='holdout: int'):
-        api.diagnose(record, [held, 3])
+        api.diagnose(record, holdout=[held, 3])
 
 
 def test_replay_takes_files(file: Path) -> None:
@@ -296,6 +298,36 @@ def test_what_holds_more_than_paths_is_refused(file: Path) -> None:
             for call in (api.calibrate, api.load, api.load_records):
                 with pytest.raises(InputError, match=f'{type(wrong).__name__} is no'):
                     call(wrong)
+
+
+def test_records_that_follow_the_first_are_not_held_out(file: Path, record: ag.Record) -> None:
+    """`diagnose(free, clamped)` held the second one out; several go into one list."""
+    for other in (file, record, [record]):
+        with pytest.raises(InputError, match=r'diagnose\(\[free, clamped\]\).*holdout='):
+            api.diagnose(record, other)
+        with pytest.raises(InputError, match=r'calibrate\(\[free, clamped\]\)$'):
+            api.calibrate(record, other)
+
+
+def test_the_home_folder_is_found(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As shells do, which leave `--out=~/a.csv` and what Python says to the program."""
+    monkeypatch.setenv('HOME', str(tmp_path))
+    shutil.copy(file, tmp_path / 'test.csv')
+    (tmp_path / 'map.yaml').write_text(
+        'time: {column: time_s, unit: s}\n'
+        'command: {column: command_m, unit: m}\nmeasured: {column: measured_m, unit: m}\n'
+    )
+    for path in ('~/test.csv', Path('~/test.csv')):
+        (found,) = api.load_records([path], channels='~/map.yaml')
+        assert found.source == str(tmp_path / 'test.csv')
+    assert main(['convert', '~/test.csv', '~/out/test.csv']) == 0
+    assert main(['info', '~/out/test.csv', '--json=~/info.json']) == 0
+    assert (tmp_path / 'info.json').is_file()
+    for name in ('~$test.csv', '~nobody/test.csv', 'a~.csv'):
+        with pytest.raises(InputError, match=r'there is no such file'):
+            api.load(name)
 
 
 def test_nothing_is_refused(file: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any, Literal, TypedDict, Unpack
 
 from actuator_glue.api.bar import shown
@@ -22,6 +22,7 @@ from actuator_glue.api.replay_data import (
 from actuator_glue.api.replay_result import Replay
 from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as path_given
 from actuator_glue.given import take_numbers
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.moments import Moments
@@ -211,8 +212,8 @@ def replay(
 
 
 def _open(source: Records, namespace: str | None, compare_live: bool) -> _Run:
-    if isinstance(source, (str, PathLike)) and is_bag(fspath(source)):
-        return _open_bag(fspath(source), namespace, compare_live)
+    if isinstance(source, (str, PathLike)) and is_bag(path_given(source)):
+        return _open_bag(str(path_given(source)), namespace, compare_live)
     if namespace is not None:
         raise InputError(
             f'namespace {namespace!r} says whose samples of a bag are meant, and what is replayed '

@@ -19,6 +19,7 @@ from actuator_glue.campaigns.series import Series, problems_of, series_of, tests
 from actuator_glue.diagnosis.verdicts import COMPLETE
 from actuator_glue.errors import InputError
 from actuator_glue.given import number
+from actuator_glue.given import path as path_given
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -39,7 +40,8 @@ class ActuatorHistory(HistoryData):
         from actuator_glue.campaigns.history_page import page  # draws: slow to import
         from actuator_glue.report import html
 
-        return html.write(Path(path), page(self, Path(path).resolve().parent))
+        path = path_given(path)
+        return html.write(path, page(self, path.resolve().parent))
 
 
 def history(
@@ -73,7 +75,7 @@ def history(
     rows = table.to_dict('records')
     return ActuatorHistory(
         actuator=actuator,
-        folder=Path(folder).resolve(),
+        folder=path_given(folder).resolve(),
         table=table,
         series=series,
         changes=changes,

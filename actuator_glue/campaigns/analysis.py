@@ -123,7 +123,13 @@ def _diagnosed(
     from actuator_glue.api.diagnosis import diagnose
 
     seed = wanted['calibrate'].get('seed', 1)
-    return diagnose(records, held or None, seed=seed, jobs=1, false_alarms=wanted['false_alarms'])
+    return diagnose(
+        records,
+        holdout=held or None,
+        seed=seed,
+        jobs=1,
+        false_alarms=wanted['false_alarms'],
+    )
 
 
 def _told(found: Diagnosis) -> Row:

@@ -22,7 +22,7 @@ from actuator_glue.campaigns.recipe import Recipe, read_recipe
 from actuator_glue.campaigns.rows import RESULTS, RowFolder, content, fingerprint, key_of, needed
 from actuator_glue.campaigns.worker_task import carry_out, row_of
 from actuator_glue.errors import InputError
-from actuator_glue.given import of_kind, whole
+from actuator_glue.given import of_kind, one_thing, path, whole
 from actuator_glue.io.json_file import write_json
 from actuator_glue.json_value import json_fields
 
@@ -99,16 +99,15 @@ def campaign(
         needed(module, 'a campaign')
     if workers is not None and whole(workers, 'workers') < 1:
         raise InputError(f'workers {workers} is below 1')
-    several = isinstance(records, Iterable) and not isinstance(records, (str, os.PathLike))
+    several = isinstance(records, Iterable) and not one_thing(records)
     given: list[Any] = list(records) if several else [records]  # type: ignore[arg-type]  # they are
-    for one in given:
-        of_kind(one, 'records', (str, os.PathLike), 'paths of files, bags or folders')
+    given = [path(one, 'records') for one in given]
     if not isinstance(recipe, Recipe):
         kinds = (str, os.PathLike, type(None))
         of_kind(recipe, 'recipe', kinds, 'a Recipe, a YAML file of one, or None')
         recipe = Recipe() if recipe is None else read_recipe(recipe)
     tasks = tasks_of(given, recipe)
-    rows = RowFolder(Path(out).resolve())
+    rows = RowFolder(path(out, 'out').resolve())
     try:
         rows.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

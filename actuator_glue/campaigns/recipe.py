@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import at_home
+from actuator_glue.given import path as path_given
 from actuator_glue.io.channel_map import ChannelMap, parse_channel_map
 from actuator_glue.io.partition import read_partition
 from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text
@@ -100,7 +102,7 @@ def read_recipe(path: Path | str) -> Recipe:
     Raises:
         InputError: it cannot be read, an unknown entry, or a value that cannot be used.
     """
-    path = Path(path)
+    path = path_given(path)
     text = read_text(path, 'recipe', 'a recipe is a page of text', 'recipes')
     return parse_recipe(parse(text, f'{path}: recipe'), path.parent, f'{path}: recipe')
 
@@ -148,7 +150,7 @@ def parse_recipe(content: object, folder: Path, where: str = 'recipe') -> Recipe
             raise InputError(f'{where}: {name} must be text, not {values[name]!r}')
     values['calibrate'] = _options(values.get('calibrate', {}), where)
     if 'table' in values:
-        values['table'] = str(folder / values['table'])
+        values['table'] = str(folder / at_home(values['table']))
     if 'partition' in values:
         values['partition'] = _here(values['partition'], folder)
         read_partition(values['partition'])
@@ -157,7 +159,8 @@ def parse_recipe(content: object, folder: Path, where: str = 'recipe') -> Recipe
 
 def _here(given: str, folder: Path) -> str:
     """Return a path that counts from a folder; a name that is no file there stays as it is."""
-    return str(folder / given) if (folder / given).is_file() else given
+    here = folder / at_home(given)
+    return str(here) if here.is_file() else given
 
 
 def _rule(content: object, folder: Path, where: str) -> FileRule:

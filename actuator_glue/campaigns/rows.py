@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from actuator_glue import __version__
 from actuator_glue.campaigns.grouping import Member, Task
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as path_given
 from actuator_glue.io.bag_reader import bag_files, is_bag
 from actuator_glue.json_value import json_value
 from actuator_glue.optional_library import library
@@ -164,7 +165,7 @@ def read_results(folder: Path | str) -> DataFrame:
     Raises:
         InputError: no campaign was run there, or the table cannot be read.
     """
-    path = Path(folder) / RESULTS
+    path = path_given(folder) / RESULTS
     if not path.is_file():
         raise InputError(f'{folder}: no {RESULTS} here; run `actuator-glue campaign` first')
     pandas = needed('pandas', 'a campaign')

@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
         found = diagnose(
             records,
-            held or None,
+            holdout=held or None,
             seed=args.seed,
             jobs=args.jobs,
             progress=tell,

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as path_given
 from actuator_glue.hybrid.ground_motion import GroundMotion, artificial
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.signature import text_encoding
@@ -78,7 +79,7 @@ def read_ground_motion(
             or another quantity than acceleration.
     """
     name, _, seed = str(given).partition(':')
-    path = Path(given)
+    path = path_given(given)
     if name == 'artificial' and not path.exists():
         if seed and not seed.isdigit():
             raise InputError(f'{given}: {seed!r} is no seed; give artificial:1 for example')

@@ -12,6 +12,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.given import one_of, one_thing
+from actuator_glue.given import path as path_given
 from actuator_glue.io import laboratory
 from actuator_glue.io.bag_mapped import read_mapped
 from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
@@ -94,12 +95,13 @@ def load_records(
     paths = list(paths)
     if not paths:
         raise InputError('no record given')
-    for path in paths:
-        if not isinstance(path, (str, PathLike)):
+    for one in paths:
+        if not isinstance(one, (str, PathLike)):
             raise InputError(
-                f'{type(path).__name__} is no path of a file or bag; give a path, as in '
+                f'{type(one).__name__} is no path of a file or bag; give a path, as in '
                 "load('test.csv')"
             )
+    paths = [path_given(one) for one in paths]
     channels = channel_map_given(channels)
     if hold is not None:
         one_of(hold, 'hold', ('zoh', 'linear'))

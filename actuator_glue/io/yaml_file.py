@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as path_given
 from actuator_glue.io.signature import text_encoding
 from actuator_glue.plain_yaml import plain_yaml
 
@@ -31,7 +32,7 @@ def located(given: Path | str, folder: str) -> Path:
         given: a path, or the name of a file of the package, with or without `.yaml`.
         folder: of the package where such files are.
     """
-    path = Path(given)
+    path = path_given(given)
     if len(path.parts) == 1 and not path.is_file() and path.stem in shipped(folder):
         own = _PACKAGE / folder / f'{path.stem}.yaml'
         return own if path.suffix in ('', own.suffix) else path

@@ -127,7 +127,7 @@ def work(request: Request, tell: Tell) -> Outcome:
             holdout = load_records(request.holdout, stiffness=request.holdout_stiffness)
         found = diagnose(
             records,
-            holdout,
+            holdout=holdout,
             seed=request.seed,
             jobs=1,
             effort=1.0 if request.paths else EFFORT,

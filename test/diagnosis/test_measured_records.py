@@ -59,7 +59,7 @@ def test_mts_is_explained_on_currents_it_was_not_fitted_to(fitted: int) -> None:
     """
     records = mts()
     held = [r for i, r in enumerate(records) if i != fitted]
-    found = diagnose([records[fitted]], held, jobs=2)
+    found = diagnose([records[fitted]], holdout=held, jobs=2)
     # 11 um remain where 6 um are noise: what is found is not said to be everything.
     assert found.verdict in ('missing-effect', 'unexplained')
     names = {n for e in found.effects for n in (e.name, *e.alternatives)}
@@ -82,7 +82,7 @@ def test_mts_is_explained_on_currents_it_was_not_fitted_to(fitted: int) -> None:
 def test_mts_of_another_day_gets_what_is_supported(seed: int) -> None:
     """Through spikes, noise and offsets 60 % of what can be removed goes, by flow or reversal."""
     fitted, held, _ = (of_another_day(r, 10 * seed + i) for i, r in enumerate(mts()))
-    found = diagnose([fitted], held, jobs=2)
+    found = diagnose([fitted], holdout=held, jobs=2)
     names = {e.name for e in found.effects}
     assert names & (REVERSAL | FLOW)
     assert not names & SPECIMEN
@@ -104,7 +104,7 @@ def test_a_second_machine_gets_what_is_supported() -> None:
         Record(1e-3 * part['r'], 1e-3 * part['y'], 1 / 129.0, 0.0, hold='linear')
         for part in (data[:cut], data[cut:])
     )
-    found = diagnose([fitted], held, jobs=2)
+    found = diagnose([fitted], holdout=held, jobs=2)
     names = {n for e in found.effects for n in (e.name, *e.alternatives)}
     nearest = [line for line in found.advice if 'the name nearest to' in line]
     assert names & {'gain', 'integral-action'} or any('integral-action' in n for n in nearest)

@@ -246,7 +246,7 @@ def test_a_diagnosis_speaks_it(tmp_path: Path) -> None:
     """Headline, picture, report and table, from the library as from the command line."""
     test = ag.simulate(ag.Command(rate=RATE, duration=8.0), stiffness=0.0, seed=3)
     with pytest.raises(InputError, match='holdout: moves in m, and the records move in deg'):
-        ag.diagnose(replace(test, motion='deg'), test)
+        ag.diagnose(replace(test, motion='deg'), holdout=test)
     found = ag.diagnose(replace(test, motion='deg'), effort=0.05, jobs=1)
     assert found.to_json()['motion'] == 'deg'
     assert ' mdeg' in found.summary() and ' um' not in found.summary()
