@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import of_kind
 from actuator_glue.given import path as given_path
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
@@ -76,8 +77,10 @@ def save_effects(path: Path | str, effects: Iterable[Effect]) -> None:
         InputError: no path, the file cannot be written, or an effect has a compiled stage of its
             own.
     """
+    of_kind(effects, 'effects', Iterable, 'several effects, as in [term(...)]')
     chosen = tuple(effects)
     for effect in chosen:
+        of_kind(effect, 'effect', Effect, 'what `term` makes')
         if effect.expression is None:
             raise InputError(f'effect {effect.name!r} is not written as an expression')
     text = yaml.safe_dump(mapping(chosen), sort_keys=False, allow_unicode=True)

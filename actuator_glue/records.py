@@ -60,13 +60,13 @@ def numbers(values: ArrayLike) -> Array:
     """Return numbers as a new array of doubles, NaN where they are masked: nobody measured those.
 
     Raises:
-        TypeError, ValueError: what is no number, complex numbers among them.
+        TypeError, ValueError: what is no number, truth values and complex numbers among them.
     """
     # A list has no type, and numpy drops the imaginary part of what stands in one. Columns of
     # pandas and others have one that may not be numpy's.
     held = values if hasattr(values, 'dtype') else np.asarray(values)
     dtype = held.dtype
-    if getattr(dtype, 'kind', '') in ('c', 'm', 'M'):
+    if getattr(dtype, 'kind', '') in ('b', 'c', 'm', 'M'):
         raise TypeError(f'{dtype} is no displacement or force')
     if getattr(dtype, 'kind', '') == 'O':
         turned = (
@@ -389,7 +389,7 @@ class Record:
                 column = numbers(values) * (newton if name == 'force' else length)
             except (TypeError, ValueError) as error:
                 raise InputError(f'{name} is not a list of numbers ({error})') from error
-            if len(column) != np.size(time):
+            if column.ndim == 1 and len(column) != np.size(time):
                 raise InputError(f'{name} has {len(column)} samples, time has {np.size(time)}')
             columns[name] = column
         return cls(

@@ -330,6 +330,34 @@ def test_the_home_folder_is_found(
             api.load(name)
 
 
+def test_what_else_fails_is_refused_by_name(
+    posterior: ag.Calibration, file: Path, record: ag.Record, tmp_path: Path
+) -> None:
+    """Errors of Python, numpy and pandas said nothing of the argument; some were passed over."""
+    arrays, mat = api.Record.from_arrays, tmp_path / 'a.mat'
+    time, moved = record.time, record.command
+    calls: dict[str, Callable[[], Any]] = {
+        'command must be one-dim': lambda: arrays(time, None, moved, unit='m'),
+        'command is not a list': lambda: arrays(time, (v for v in moved), moved, unit='m'),
+        'measured is not a list': lambda: arrays(time, moved, moved > 0.0, unit='m'),
+        'command: NoneType': lambda: posterior.predict(cast('Any', None), 0.0),
+        'command is a list': lambda: posterior.predict(cast('Any', [record]), 0.0),
+        "stiffness is 'a'": lambda: posterior.save_mat(mat, cast('Any', [0.0, 'a'])),
+        "stiffness is '0'": lambda: api.calibrate([record, record], stiffness=(0, '0')[::-1]),
+        'partition is a Calib': lambda: api.rths(posterior, 'sdof'),
+        'partition is a C': lambda: api.compare_compensators(posterior, 'sdof'),
+        'resample': lambda: api.join(file, file, resample='a'),
+        'no record given': lambda: api.campaign([], tmp_path / 'out'),
+        'records': lambda: api.campaign(b'a.csv', tmp_path / 'out'),
+        'effect is 3': lambda: api.effects.save_effects(tmp_path / 'a.yaml', [3]),
+        'effects is None': lambda: api.effects.save_effects(tmp_path / 'a.yaml', None),
+        'bytes is no path': lambda: api.load(b'a.csv'),
+    }
+    for name, call in calls.items():
+        with pytest.raises(InputError, match=name):
+            call()
+
+
 def test_nothing_is_refused(file: Path) -> None:
     """No record at all."""
     for call in (api.calibrate, api.diagnose, api.replay, api.load_records):

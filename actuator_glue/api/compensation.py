@@ -12,6 +12,7 @@ from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import seed_given
+from actuator_glue.api.partition_given import partition_given
 from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.hybrid.compensator import KINDS
@@ -105,7 +106,8 @@ def compare_compensators(
     Raises:
         InputError: as `rths`.
     """
-    seed, calibration = seed_given(seed), calibration_given(calibration)
+    seed, partition = seed_given(seed), partition_given(partition)
+    calibration = calibration_given(calibration)
     found: dict[str, StabilityResult] = {}
     with shown('compensators', 1.0, progress) as done:
         for kind in KINDS:

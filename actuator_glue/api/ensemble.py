@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from actuator_glue.api.given import one_record_given
 from actuator_glue.api.simulation import Command
 from actuator_glue.errors import InputError
-from actuator_glue.given import number
+from actuator_glue.given import number, vector
 from actuator_glue.hybrid.actuator import table_of
 from actuator_glue.inference.predictive import ResidualModel, fit_residual
 from actuator_glue.model.exact import Initial
@@ -103,9 +103,15 @@ def commanded(
             True,
         )
     else:
+        samples = vector(command, 'command')
+        if samples.ndim != 1:
+            raise InputError(
+                f'command: {type(command).__name__} is none; give one Command or record, the file '
+                'of a record, or samples [m], shape (n,)'
+            )
         if rate is None:
             raise InputError('the command is samples: give their rate [Hz], as rate=1000.0')
-        samples, period = np.asarray(command), 1.0 / _rate(rate)
+        period = 1.0 / _rate(rate)
     if stiffness is None:
         raise InputError('give the specimen stiffness [N/m], 0 for a free actuator')
     shape = np.shape(samples)

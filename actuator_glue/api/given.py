@@ -46,7 +46,7 @@ def records_given(
         raise InputError(f'{name}: no record given')
     known: list[Any] = [stiffness] * len(some)
     if np.ndim(0.0 if stiffness is None else np.asarray(stiffness, dtype=object)) == 1:
-        known = list(np.asarray(stiffness))
+        known = list(np.asarray(stiffness, dtype=object))
         if len(known) != len(some):
             raise InputError(f'{len(known)} stiffnesses for {len(some)} {name}: one for each')
     out: list[Record] = []

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -228,6 +228,7 @@ class PosteriorModel(Result):
             InputError: the file cannot be written, or an impossible stiffness.
         """
         of = self.drawn()
-        several = of.stiffness if stiffness is None else np.ravel(np.asarray(stiffness))
+        several: Any = of.stiffness if stiffness is None else stiffness
+        several = np.ravel(np.asarray(several, dtype=object))
         what = Exported(of.draws, of.names, of.units, of.structure.effects, of.problems)
-        return write_mat(path, what, [under(what, check_stiffness(float(k))) for k in several])
+        return write_mat(path, what, [under(what, check_stiffness(k)) for k in several])

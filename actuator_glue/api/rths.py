@@ -107,6 +107,7 @@ def rths(
     """
     asked = options.chosen(Showing, None, changes, 'rths')
     seed, draws = seed_given(seed), whole(draws, 'draws')
+    partition = partition_given(partition)
     calibration = calibration_given(calibration)
     frequencies = [number(f, 'frequencies') for f in np.ravel(np.asarray(frequencies, object))]
     motion_kinds = (GroundMotion, str, PathLike, type(None))
@@ -116,7 +117,6 @@ def rths(
     if draws < 2:
         raise InputError(f'{draws} draws are no distribution; use at least 2')
     started = time.perf_counter()
-    partition = partition_given(partition)
     if ground_motion is not None and not isinstance(ground_motion, GroundMotion):
         ground_motion = read_ground_motion(ground_motion)
     _check(partition, frequencies, ground_motion, criteria)

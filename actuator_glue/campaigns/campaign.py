@@ -102,6 +102,8 @@ def campaign(
     several = isinstance(records, Iterable) and not one_thing(records)
     given: list[Any] = list(records) if several else [records]  # type: ignore[arg-type]  # they are
     given = [path(one, 'records') for one in given]
+    if not given:
+        raise InputError('records: no record given')
     if not isinstance(recipe, Recipe):
         kinds = (str, os.PathLike, type(None))
         of_kind(recipe, 'recipe', kinds, 'a Recipe, a YAML file of one, or None')

@@ -107,6 +107,7 @@ def join(
         >>> join('cmd.csv', 'daq.csv', by='correlation', stiffness=0.0)  # doctest: +SKIP
     """
     one_of(by, 'joining by', get_args(By))
+    way = None if resample is None else rate_and_way(resample)
     channels = channel_map_given(channels)
     command = _part(command_file, channels, 'command')
     response = _part(response_file, channels, 'measured')
@@ -135,9 +136,9 @@ def join(
     try:
         period = uniform_period(values['time'], str(response_file))
     except InputError:
-        if resample is None:
+        if way is None:
             raise
-        made = resample_evenly(values, *rate_and_way(resample), where=str(response_file))
+        made = resample_evenly(values, *way, where=str(response_file))
         values, period = made.values, made.period
         warn(f'{response_file}: {made.told()}')
         source = f'{source} ({made.name()})'

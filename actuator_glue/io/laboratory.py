@@ -218,7 +218,8 @@ def _by_name(
     table = format_of(path).read(path, None)
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
     period, told, said = table.period, [*table.told], noted_rate(table.notes)
-    if period is None and said is not None and not _may_hold_times(table):
+    # Of a part of a test a rate does not say when it began.
+    if period is None and said is not None and needed == _NEEDED and not _may_hold_times(table):
         period = 1.0 / said[1]
         told.append(f'no column of times; {said[0]!r} is taken, as it says')
     if period is not None:

@@ -14,6 +14,7 @@ from scipy.io import savemat
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
+from actuator_glue.io.join import join
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.load import load
 
@@ -89,6 +90,14 @@ def test_a_column_that_may_be_of_times_is_not_passed_over(tmp_path: Path, name: 
     path = text(tmp_path / 'a.csv', '# sample rate: 500 Hz', {name: TIME, **MOVED})
     with pytest.raises(InputError, match='no column for time'):
         read(path)
+
+
+def test_a_part_of_a_test_needs_times(tmp_path: Path) -> None:
+    """A rate does not say when the command began."""
+    command = text(tmp_path / 'a.csv', '# fs = 1000', {'command_mm': MOVED['command_mm']})
+    response = {'time_s': TIME, 'measured_mm': MOVED['measured_mm']}
+    with pytest.raises(InputError, match='no column for time'):
+        join(command, text(tmp_path / 'b.csv', '', response))
 
 
 @pytest.mark.parametrize(
