@@ -33,6 +33,7 @@ _NO_LENGTH = re.compile(
 )
 _SAMPLES = 200_000  # of a channel that are compared
 _ALIKE = 0.8  # correlation above which one displacement follows another
+_FARTHER = 3.0  # times the command; what moves farther is rather a force, or in another unit
 _LATEST = 0.25  # s; no actuator follows later
 _DAY = 86_400.0  # s
 # Days since 1900, and since year 0, in this century.
@@ -269,7 +270,7 @@ def _displacements(columns: list[ColumnLook], rate: float) -> dict[str, Guess]:
     named = {role: [c for c in found if _called(c, role)] for role, found in could.items()}
     able = {role: named[role] or found for role, found in could.items()}
     certain = all(len(found) == 1 for found in named.values())
-    best: tuple[tuple[bool, float], float, float, ColumnLook, ColumnLook] | None = None
+    best: tuple[tuple[bool, bool, float], float, float, ColumnLook, ColumnLook] | None = None
     for one, other in combinations(columns, 2):
         orders = [
             pair
@@ -282,9 +283,10 @@ def _displacements(columns: list[ColumnLook], rate: float) -> dict[str, Guess]:
         likeness, lag = follows(_at(one, rate), _at(other, rate), rate)
         for first, second in orders:
             late = lag if first is one else -lag
-            # A force moves with what is measured; what is measured moves after the command.
-            rank = (late > 0.5 / rate, abs(likeness))
-            if (certain or rank[1] > _ALIKE) and (best is None or rank > best[0]):
+            # A force moves with what is measured; what is measured moves after the command, about
+            # as far.
+            rank = (late > 0.5 / rate, _as_far(one, other), abs(likeness))
+            if (certain or rank[2] > _ALIKE) and (best is None or rank > best[0]):
                 best = (rank, likeness, late, first, second)
     if best is None:
         return {
@@ -294,6 +296,15 @@ def _displacements(columns: list[ColumnLook], rate: float) -> dict[str, Guess]:
         }
     _, likeness, late, first, second = best
     return _pair(named, (first, second), likeness, late, rate)
+
+
+def _as_far(one: ColumnLook, other: ColumnLook) -> bool:
+    """Whether two columns move about as far as each other, in their units where both have one."""
+    strokes = []
+    for column in (one, other):
+        least, most = column.range()
+        strokes.append((most - least) * ROLES['command'].get(column.unit, 1.0))
+    return max(strokes) < _FARTHER * min(strokes)
 
 
 def _pair(

@@ -11,6 +11,7 @@ from actuator_glue.io.formats.delimited import (
     DELIMITERS,
     fields_of,
     is_number,
+    is_remark,
     is_stamp,
     read_head,
     uncommented,
@@ -97,6 +98,8 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
             if rows:
                 found.append(SampleRows(first, rows))
                 rows, follows, above = 0, True, []
+            if rows and is_remark(line, like.delimiter, len(like.numbers)):
+                continue
             empty = 0
             text = uncommented(line.rstrip('\r\n'))
             above = [*above[-2:], (at, fields_of(text, like.delimiter))]

@@ -90,6 +90,18 @@ def test_one_force_among_others_is_taken(tmp_path: Path, names: str, taken: str)
     assert (found['channels']['force']['column'], found['forces']) == (taken, [])
 
 
+@pytest.mark.parametrize('order', ['ucf', 'ufc', 'fuc'])
+def test_a_force_that_follows_is_not_measured(tmp_path: Path, order: str) -> None:
+    """A spring moves with the piston; without names the stroke tells them apart."""
+    command, measured, _ = channels()
+    columns = {'u': command, 'c': measured, 'f': 2400.0 * measured}
+    path = write(tmp_path / 'a.txt', 'a,b,c,d', [TIME, *(columns[name] for name in order)])
+    found = looked(tmp_path, path)
+    names = dict(zip(order, 'bcd', strict=True))
+    chosen = {role: found['channels'][role]['column'] for role in ('command', 'measured')}
+    assert chosen == {'command': names['u'], 'measured': names['c']}
+
+
 @pytest.mark.parametrize('seed', range(4))
 def test_channels_without_names_are_told_by_what_they_do(tmp_path: Path, seed: int) -> None:
     """The one that follows is measured; the proposal reads the file; a force is not guessed."""

@@ -4,6 +4,7 @@ import datetime
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from actuator_glue.cli.main import main
@@ -133,3 +134,20 @@ def test_how_far_times_go_back_tells_why(
     path.write_text('\n'.join(['time_s,command_mm,measured_mm', *rows]) + '\n')
     with pytest.raises(InputError, match=f'time goes back at sample .*{told}'):
         read(path)
+
+
+@pytest.mark.parametrize('name', [None, 'time', 'Timestamp'])
+@pytest.mark.parametrize('days', [None, 0, 400])
+def test_an_index_of_times_as_pandas_writes_it(
+    tmp_path: Path, name: str | None, days: int | None
+) -> None:
+    """Without a name in front of the others, and durations with days: both were refused."""
+    passed = pd.to_timedelta(
+        5 * np.arange(COUNT) + 3_600_000 + 86_400_000 * (days or 0), unit='ms'
+    )
+    index = passed if days is not None else pd.Timestamp('2024-05-03') + passed
+    frame = pd.DataFrame({'command_mm': COMMAND, 'measured_mm': np.roll(COMMAND, 3)}, index)
+    frame.rename_axis(name).to_csv(tmp_path / 'a.csv')
+    record = read(tmp_path / 'a.csv')
+    start = first + (DAY if days is None else 0)
+    assert (record.period, record.start_ns) == (5e-3, start * 10**9)

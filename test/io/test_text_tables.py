@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map, read_channel_map
 from actuator_glue.io.laboratory import read
@@ -202,7 +203,7 @@ def test_one_name_fewer_is_no_guess(tmp_path: Path) -> None:
     [
         (['0.020', '1', '2', '3', '4'], 'line 22 has 5 entries'),
         (['0.020', '1', '2'], 'line 22 has 3 entries'),
-        (['# stopped'], 'line 22 has 1 entries'),
+        (['# stopped'], 'without samples after sample 19'),
         (['0.020', '1', '2', '"3'], 'line 22 has 1 entries'),
     ],
 )
@@ -211,6 +212,28 @@ def test_a_row_of_another_width_is_refused(tmp_path: Path, row: list[str], words
     path = table(tmp_path / 'a.csv', [*ROWS[:20], row, *ROWS[21:]])
     with pytest.raises(InputError, match=words):
         read(path)
+
+
+def test_comments_among_the_samples(tmp_path: Path) -> None:
+    """They refused a good file; where no clock tells that no sample is missing, they do."""
+    end = [['# end of the file'], ['% 60 samples']]
+    rows = [*ROWS[:20], ['# paused'], *ROWS[20:50], ['## note: load cell, changed'], *ROWS[50:]]
+    for some in ([*rows, *end], [*ROWS, *end], [['# begin'], *ROWS]):
+        check(table(tmp_path / 'a.csv', some))
+        assert main(['map', str(tmp_path / 'a.csv')]) == 0
+    with pytest.raises(InputError, match='line 22'):
+        read(table(tmp_path / 'a.csv', [*ROWS[:20], ['# 0.020', *ROWS[20][1:]], *ROWS[21:]]))
+    untimed = parse_channel_map(
+        {
+            'rate': 1000,
+            'command': {'column': 'command_mm', 'unit': 'mm'},
+            'measured': {'column': 'measured_mm', 'unit': 'mm'},
+        },
+        'a map',
+    )
+    assert len(read(table(tmp_path / 'a.csv', [*ROWS, *end]), channels=untimed)) == COUNT
+    with pytest.raises(InputError, match='line 22 has 1 entries'):
+        read(table(tmp_path / 'a.csv', rows), channels=untimed)
 
 
 @pytest.mark.parametrize('missing', [*PANDAS, *MSVC, *OTHERS])

@@ -39,12 +39,12 @@ _FORTRAN = re.compile(r'(?<=[\d.])[dD](?=[+-]?\d)')  # the exponent of a double:
 _GROUPED = re.compile(r'[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+', re.ASCII)
 _MONTHS = ('jan', 'feb', 'mar', 'apr', 'may', 'jun', 'jul', 'aug', 'sep', 'oct', 'nov', 'dec')
 # A date whose order is known: year first, dots behind the day, or a month by its name. Of any
-# other, such as 05/03/2024, only the time of day is taken.
+# other, such as 05/03/2024, only the time of day is taken. Durations may have days in front.
 _STAMP = re.compile(
     r'(?:(?:(?P<year>\d{4})[-/.](?P<month>\d\d)[-/.](?P<day>\d\d)'
     r'|(?P<day_2>\d{1,2})\.(?P<month_2>\d{1,2})\.(?P<year_2>\d{4})'
     rf'|(?P<day_3>\d{{1,2}})[- ](?P<name>{"|".join(_MONTHS)})[- ](?P<year_3>\d{{4}})'
-    r'|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d\d))(?:T|,? ))?'
+    r'|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d\d)|(?P<days>\d+) days?)(?:T|,? ))?'
     r'(?P<hour>\d{1,2})(?P<clock>:\d\d:\d\d)(?:(?:[.,]|:(?=\d{3}\b))(?P<fraction>\d+))?'
     r'(?: ?(?P<half>[ap])\.?m\.?)?(?: ?(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d))?',
     re.ASCII | re.IGNORECASE,
@@ -85,6 +85,7 @@ class TextHead:
         stamps: positions of columns that hold dates or times of day.
         named: entries of the line of names, whether it fits or not.
         rows: samples that are read; None for all.
+        timed: a column has times or counts samples.
     """
 
     names: list[str]
@@ -98,6 +99,7 @@ class TextHead:
     named: int
     stamps: frozenset[int] = frozenset()
     rows: int | None = None
+    timed: bool = False
 
 
 def read_head(
@@ -147,6 +149,7 @@ def read_head(
         kinds = fields_of(top[header_lines], delimiter or _of_units(line, top[header_lines]))
         header_lines += len(kinds) == len(units) and kinds_line(kinds)
     rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
+    rows = [text for text in rows if not _COMMENT.match(text)] or rows
     if delimiter is None:
         delimiter = _best_delimiter(line, rows[0])
     table = [fields_of(row, delimiter) for row in rows]
@@ -403,7 +406,8 @@ def _seconds(entry: str) -> float:
         whole = datetime.fromisoformat(f'{date}T{hour:02d}{stamp["clock"]}{zone}')
     except ValueError:  # 25:00:00
         return np.nan
-    return whole.timestamp() + float(f'0.{stamp["fraction"] or 0}')
+    passed = 86_400.0 * float(stamp['days'] or 0)
+    return passed + whole.timestamp() + float(f'0.{stamp["fraction"] or 0}')
 
 
 def fields_of(line: str, delimiter: str | None) -> list[str]:
@@ -501,18 +505,29 @@ def _rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
 
 
 def _all_rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
-    """Yield line numbers from 1 and rows: no empty lines, at the end no rows of empty entries."""
+    """Yield line numbers from 1 and rows: no empty lines, at the end no rows of empty entries.
+
+    Nor comments at the end; elsewhere one may stand for a sample, which only a clock tells.
+    """
     empty = _NOTHING + ('\t' if head.delimiter is None else '')
     parted = empty + (head.delimiter or '') + '"'
     held: list[tuple[int, str]] = []
     for number, line in enumerate(islice(file, head.lines, None), head.lines + 1):
-        if line.strip(parted):
+        if is_remark(line, head.delimiter, head.least):
+            held += [] if head.timed else [(number, line)]
+        elif line.strip(parted):
             if held:
                 yield from held
                 held.clear()
             yield number, line
         elif line.strip(empty):
             held.append((number, line))
+
+
+def is_remark(line: str, delimiter: str | None, width: int) -> bool:
+    """Return whether a line is a comment, and no row of so many entries behind a `#`."""
+    comment = _COMMENT.match(line)
+    return comment is not None and len(fields_of(line[comment.end() :], delimiter)) < width
 
 
 def _block(
@@ -645,7 +660,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                 f'{path}: the first line must name the columns with their units, as in '
                 f'{EXAMPLE}; or describe the file with --channels MAP.yaml'
             )
-        by_name = True
+        by_name, timed = True, any(bare(name) == 'time' for name in head.names)
     else:
         head = replace(
             read_head(path, channels.header_lines, channels.delimiter, channels.decimal),
@@ -653,6 +668,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         )
         wanted = [channel.column for channel in channels.roles().values()]
         by_name = any(isinstance(column, str) for column in (*wanted, channels.sample_number))
+        timed = channels.time is not None or channels.sample_number is not None
+    head = replace(head, timed=timed)
     if by_name and head.named and not head.names:
         touching = head.delimiter is None and head.width < head.named
         raise InputError(
@@ -671,7 +688,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     names = head.names or [''] * head.width
     return FileTable(
         [
-            Column(name, bare(name), 's') if at in head.stamps else Column(name, name, unit)
+            # pandas writes stamps of the index without a name, in front.
+            Column(name, bare(name) or 'time' * (at == 0), 's')
+            if at in head.stamps
+            else Column(name, name, unit)
             for at, (name, unit) in enumerate(zip(names, head.units, strict=True))
         ],
         head.notes,
