@@ -35,6 +35,13 @@ def number(text: str) -> float:
     return float(text) + 0.0  # -0 is 0
 
 
+def whole(text: str) -> int:
+    """Return a whole number; 6e4 is one."""
+    if not number(text).is_integer():
+        raise argparse.ArgumentTypeError(f'{text!r} is not a whole number')
+    return int(text) if text.strip().lstrip('+-').isdecimal() else int(float(text))
+
+
 def duration(text: str) -> float:
     """Return a time with its unit, as in 90s, 30min, 24h or 2d, in seconds."""
     value = text.strip()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from actuator_glue.arguments import Output, add_force, claim, make_room
+from actuator_glue.arguments import Output, add_force, claim, make_room, whole
 from actuator_glue.cli._output import progress, say
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import writable
@@ -27,7 +27,7 @@ def add_out(parser: argparse.ArgumentParser) -> None:
     )
     add_force(parser)
     parser.add_argument(
-        '--block', type=int, metavar='N', help='samples per message of a bag (default 64)'
+        '--block', type=whole, metavar='N', help='samples per message of a bag (default 64)'
     )
     parser.add_argument(
         '--unit',

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import Output, number, number_or_auto
+from actuator_glue.arguments import Output, number, number_or_auto, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
@@ -51,13 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--evaluations',
-        type=int,
+        type=whole,
         default=60_000,
         metavar='N',
         help='likelihood evaluations (default 60000); with effects and an automatic G as many '
         'again where it changes',
     )
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
+    parser.add_argument('--seed', type=whole, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
         '--sampler',
         choices=('adaptive', 'published'),

@@ -10,7 +10,7 @@ import argparse
 import time
 from pathlib import Path
 
-from actuator_glue.arguments import Input
+from actuator_glue.arguments import Input, whole
 from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--workers',
-        type=int,
+        type=whole,
         metavar='N',
         help='processes of this machine (default: one for each core)',
     )

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import Input, Output
+from actuator_glue.arguments import Input, Output, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._heap import give_back
@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_partition(parser)
     add_prior(parser)
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
+    parser.add_argument('--seed', type=whole, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
         '--effort',
         type=float,
@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'about a minute on two cores (default 1)',
     )
     parser.add_argument(
-        '--jobs', type=int, default=2, metavar='N', help='threads for the refits (default 2)'
+        '--jobs', type=whole, default=2, metavar='N', help='threads for the refits (default 2)'
     )
     add_json(parser)
 

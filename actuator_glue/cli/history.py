@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from actuator_glue.arguments import Folder, Input, duration
+from actuator_glue.arguments import Folder, Input, duration, whole
 from actuator_glue.cli._output import add_json, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='TIME',
         help='time from the last test to the next one, as 12h or 7d (default: as between tests)',
     )
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
+    parser.add_argument('--seed', type=whole, default=1, metavar='S', help='seed (default 1)')
     add_json(parser)
 
 

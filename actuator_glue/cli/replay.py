@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import Input, number, number_or_auto
+from actuator_glue.arguments import Input, number, number_or_auto, whole
 from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='G',
         help="G of Eq. (4); 'auto': half of the samples that each window's residual is worth",
     )
-    group.add_argument('--evaluations', type=int, metavar='N', help='evaluations per window')
-    group.add_argument('--seed', type=int, metavar='S', help='seed of the sampler')
+    group.add_argument('--evaluations', type=whole, metavar='N', help='evaluations per window')
+    group.add_argument('--seed', type=whole, metavar='S', help='seed of the sampler')
     add_json(parser)
 
 

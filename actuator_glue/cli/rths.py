@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-from actuator_glue.arguments import Input, Output, number
+from actuator_glue.arguments import Input, Output, number, whole
 from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='largest P(unstable) to go with, 0 to 1; its upper 95 %% bound is held to it',
     )
     parser.add_argument(
-        '--draws', type=int, default=1000, metavar='N', help='draws to use (default 1000)'
+        '--draws', type=whole, default=1000, metavar='N', help='draws to use (default 1000)'
     )
     parser.add_argument(
         '--frequency',
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--seed',
-        type=int,
+        type=whole,
         default=1,
         metavar='S',
         help='seed of specimens and sensor noise (default 1)',

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.arguments import Input, claim, given, number
+from actuator_glue.arguments import Input, claim, given, number, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import note, progress
 from actuator_glue.cli._save import add_out, check_out, save
@@ -74,8 +74,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_effects_file(plant)
     plant.add_argument('--noise-mm', type=number, help='displacement noise, sd (default 0.01)')
     plant.add_argument('--force-noise-n', type=number, help='force noise, sd [N] (default 2)')
-    plant.add_argument('--bits', type=int, help='resolution of both converters (default none)')
-    plant.add_argument('--seed', type=int, default=1, help='seed of the noise (default 1)')
+    plant.add_argument('--bits', type=whole, help='resolution of both converters (default none)')
+    plant.add_argument('--seed', type=whole, default=1, help='seed of the noise (default 1)')
     plant.add_argument('--actuator', default='simulated', help='name (default simulated)')
     command = parser.add_argument_group('command')
     command.add_argument(
@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     command.add_argument('--f1', type=number, metavar='HZ', help='highest frequency (default 10)')
     command.add_argument('--frequency', type=number, metavar='HZ', help='of a sine (default 1)')
     command.add_argument(
-        '--command-seed', type=int, metavar='S', help='of noise and earthquake (default 0)'
+        '--command-seed', type=whole, metavar='S', help='of noise and earthquake (default 0)'
     )
     command.add_argument('--channels', type=Input, metavar='MAP.yaml', help='channel map of FILE')
     parser.add_argument('--hold', choices=('zoh', 'linear'), default='zoh', help='default zoh')

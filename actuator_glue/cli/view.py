@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 
-from actuator_glue.arguments import Input
+from actuator_glue.arguments import Input, whole
 from actuator_glue.cli._output import note, say
 from actuator_glue.errors import InputError
 
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--live', action='store_true', help='what the nodes publish now; needs ROS 2'
     )
     parser.add_argument(
-        '--port', type=int, default=8766, metavar='N', help='of 127.0.0.1; 0: any (default 8766)'
+        '--port', type=whole, default=8766, metavar='N', help='of 127.0.0.1; 0: any (default 8766)'
     )
     parser.add_argument(
         '--namespace', metavar='/NS', help='which actuator, where there are several'

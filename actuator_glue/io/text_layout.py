@@ -56,6 +56,8 @@ def text_layout(path: Path) -> TextLayout:
     """
     with open_text(path, errors='replace') as file:
         lines = [line.rstrip('\r\n') for line in islice(file, _LOOK)]
+    if not any(line.strip() for line in lines):
+        raise InputError(f'{path}: the file is empty')
     found = [rows for d in (*DELIMITERS, None) if (rows := _first_rows(lines, d)) is not None]
     if not found:
         raise InputError(f'{path}: no rows of at least two numbers in the first {_LOOK} lines')

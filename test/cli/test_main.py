@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from actuator_glue.arguments import whole
 from actuator_glue.cli import main as entry
 from actuator_glue.cli._output import table
 from actuator_glue.errors import InputError
@@ -36,6 +37,22 @@ def test_help_names_every_command_with_one_line(run) -> None:
     for name, file in entry.commands().items():
         assert name in done.out
         assert len(entry.summary(file)) > 20, name
+
+
+@pytest.mark.parametrize(
+    ('text', 'number'), [('6e4', 60_000), ('18446744073709551617', 2**64 + 1), (' 3 ', 3)]
+)
+def test_whole_numbers_may_have_an_exponent(text: str, number: int) -> None:
+    """As in Python; none loses a digit."""
+    assert whole(text) == number
+
+
+@pytest.mark.parametrize('text', ['1.5', 'abc', 'nan', '1e999', '6e-1', ''])
+def test_what_is_no_whole_number_is_refused(run, text: str) -> None:
+    done = run('calibrate', 'a.csv', '--evaluations', text)
+    assert done.code == 2
+    assert 'argument --evaluations: ' in done.err
+    assert 'invalid' not in done.err
 
 
 def test_the_title_of_a_narrow_table_stays_on_a_line(capsys: pytest.CaptureFixture[str]) -> None:

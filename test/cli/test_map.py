@@ -54,6 +54,12 @@ def test_a_rate_that_the_clock_contradicts_is_no_answer(
     assert looked(tmp_path, path)['works']
 
 
+def test_an_empty_file_is_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'a.csv').write_text('\n\n')
+    assert main(['map', str(tmp_path / 'a.csv')]) == 2
+    assert 'a.csv: the file is empty' in capsys.readouterr().err
+
+
 def test_several_forces_are_shown_and_none_is_guessed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -142,9 +142,8 @@ def test_an_index_of_times_as_pandas_writes_it(
     tmp_path: Path, name: str | None, days: int | None
 ) -> None:
     """Without a name in front of the others, and durations with days: both were refused."""
-    passed = pd.to_timedelta(
-        5 * np.arange(COUNT) + 3_600_000 + 86_400_000 * (days or 0), unit='ms'
-    )
+    first = 3600 + 86_400 * (days or 0)
+    passed = pd.to_timedelta(5 * np.arange(COUNT) + 1000 * first, unit='ms')
     index = passed if days is not None else pd.Timestamp('2024-05-03') + passed
     frame = pd.DataFrame({'command_mm': COMMAND, 'measured_mm': np.roll(COMMAND, 3)}, index)
     frame.rename_axis(name).to_csv(tmp_path / 'a.csv')
