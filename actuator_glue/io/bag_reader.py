@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import warnings
 from collections import deque
@@ -62,8 +63,10 @@ def refuse(message: str) -> NoReturn:
 
 
 def warn_caller(message: str) -> None:
-    """Warn of a note: the default for parts left out of an otherwise usable whole."""
-    warnings.warn(message, stacklevel=3)
+    """Warn of a note, at the line of the caller's own code: the default for what is told."""
+    package = f'{Path(__file__).parents[1]}/'
+    own = (i for i, f in enumerate(inspect.stack(0), 1) if not f.filename.startswith(package))
+    warnings.warn(message, stacklevel=next(own, 1))
 
 
 def is_bag(path: Path | str) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.given import path as path_given
+from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
 from actuator_glue.io.file_notes import noted, stated
 from actuator_glue.io.formats import Column, FileTable, format_of
@@ -79,7 +79,7 @@ def read(
     hold: Hold | None = None,
     actuator: str | None = None,
     resample: Resample | None = None,
-    warn: Callable[[str], None] = warnings.warn,
+    warn: Callable[[str], None] = warn_caller,
 ) -> Record:
     """Return the record of a laboratory file.
 

@@ -177,4 +177,5 @@ def test_other_formats_state_it_as_well(
         record = load(tmp_path / name)
     assert record.rate == 500.0
     assert 'no column of times' in str(told[0].message)
+    assert told[0].filename == __file__  # the line of whoever asked
     assert record.stiffness == (250e3 if make is scalar else None)
