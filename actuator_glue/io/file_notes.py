@@ -38,8 +38,9 @@ _STATED = {
 # A `Hold: 5 s` is that of a load; 0, 1 and `1st` may be the order of the command's.
 _HOLD_OF_A_LOAD = re.compile(
     r'(?!.*(?:order|linear|[zf]oh))(?![01](?:\.0*)?$)(?!\d+(?:st|th)\b)[+-]?\d.*'
-    r'|none|off|no|n/?a|-*'
 )
+# What stands in the place of a value and says nothing.
+_NOTHING = re.compile(r'none|off|no|n/?a|tbd|unknown|[-?]*')
 _TYPED = 0.85  # as alike as words are where a letter of a long one is missing or exchanged
 
 
@@ -154,10 +155,10 @@ def _is_stated(meant: str, value: str) -> bool:
 
 
 def _ours(name: str, value: str) -> bool:
-    """Return whether a name with its value is one of `NOTES`, and not the hold of a load."""
-    known = note_of(name)
-    another = known == 'hold' and _HOLD_OF_A_LOAD.fullmatch(value.strip().casefold())
-    return known is not None and not another
+    """Return whether a name with its value says one of `NOTES`; the hold of a load does not."""
+    known, said = note_of(name), value.strip().casefold()
+    another = known == 'hold' and _HOLD_OF_A_LOAD.fullmatch(said)
+    return known is not None and not another and not _NOTHING.fullmatch(said)
 
 
 def _meant(name: str) -> str | None:

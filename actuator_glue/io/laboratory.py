@@ -18,7 +18,7 @@ from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
 from actuator_glue.io.file_notes import noted, stated
 from actuator_glue.io.formats import Column, FileTable, format_of
-from actuator_glue.io.noted_rate import noted_rate
+from actuator_glue.io.noted_rate import noted_rates
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.units import (
@@ -105,7 +105,7 @@ def read(
     for line in found.told:
         warn(f'{path}: {line}')
     values, period = found.values, found.period
-    said_hold = found.hold
+    said_hold = None if found.hold is None else found.hold.strip().lower()
     first = float(values['time'][0]) if 'time' in values else 0.0
     source = str(path)
     if period is None:
@@ -203,7 +203,7 @@ def _refuse_empty(path: Path, values: Mapping[str, Array]) -> None:
 def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
     text = notes.get('stiffness_N_per_m')
     try:
-        return None if text is None else float(text)
+        return None if text is None else float(text.removesuffix('N/m'))
     except ValueError as error:
         raise InputError(f'{path}: stiffness_N_per_m = {text!r} is not a number') from error
 
@@ -217,11 +217,11 @@ def _by_name(
     """
     table = format_of(path).read(path, None)
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
-    period, told, said = table.period, [*table.told], noted_rate(table.notes)
+    period, told = table.period, [*table.told]
     # Of a part of a test a rate does not say when it began.
-    if period is None and said is not None and needed == _NEEDED and not _may_hold_times(table):
-        period = 1.0 / said[1]
-        told.append(f'no column of times; {said[0]!r} is taken, as it says')
+    if period is None and needed == _NEEDED and (period := stated_period(table)) is not None:
+        (note,) = noted_rates(table.notes).values()
+        told.append(f'no column of times; {note!r} is taken, as it says')
     if period is not None:
         needed = tuple(role for role in needed if role != 'time')
     _refuse_unread(path, table, {*needed, 'force'})
@@ -246,9 +246,8 @@ def _by_name(
 
 def stated_period(table: FileTable) -> float | None:
     """Return the time between samples [s]: of waveforms, or by a note where no column tells it."""
-    said = noted_rate(table.notes)
-    by_note = None if said is None or _may_hold_times(table) else 1.0 / said[1]
-    return by_note if table.period is None else table.period
+    rates = [] if _may_hold_times(table) else [*noted_rates(table.notes)]
+    return 1.0 / rates[0] if table.period is None and len(rates) == 1 else table.period
 
 
 def _may_hold_times(table: FileTable) -> bool:
@@ -261,19 +260,18 @@ def _may_hold_times(table: FileTable) -> bool:
 
 def _unlike_clock(table: FileTable, time: Array | None, period: float | None) -> Iterator[str]:
     """Yield where a note of a file states another sample rate than the clock that is taken."""
-    said, found, by = noted_rate(table.notes), None, 'channel map or waveform say'
-    if said is None:
-        return
-    note, rate = said
-    if time is not None:
-        found, by = rate_by_clock(np.arange(len(time)), time, rate), 'its column of times says'
-    elif period is not None and abs(period * rate - 1.0) > APART:
-        found = 1.0 / period
-    if found is not None:
-        yield (
-            f'it says {note!r}, and is taken at {found:.6g} Hz, as {by}; mend the one that is '
-            'wrong'
-        )
+    by = 'channel map or waveform say' if time is None else 'its column of times says'
+    for rate, note in noted_rates(table.notes).items():
+        found = None
+        if time is not None:
+            found = rate_by_clock(np.arange(len(time)), time, rate)
+        elif period is not None and abs(period * rate - 1.0) > APART:
+            found = 1.0 / period
+        if found is not None:
+            yield (
+                f'it says {note!r}, and is taken at {found:.6g} Hz, as {by}; mend the one that is '
+                'wrong'
+            )
 
 
 def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:

@@ -10,30 +10,29 @@ from actuator_glue.records import FASTEST_RATE, SLOWEST_RATE
 # A sample rate as people write it, with its unit in the name or behind the value: Hz without one.
 _RATE = re.compile(
     r'(?:sampl(?:e|es|ing)_?(?:rate|freq(?:uency)?)|samples_per_second|abtast(?:rate|frequenz)|f_?s)'
-    r'(?:_?[\[(]?(?P<unit>k?hz)[\])]?)?'
+    r'(?:_?[\[(]?(?P<unit>k?hz|1/s|s/s)[\])]?)?'
 )
 _STEP = re.compile(
     r'(?:sampl(?:e|ing)_?(?:interval|period)|time_?step|delta_?t|dt)'
-    r'(?:_?[\[(]?(?P<unit>[mun]?s)[\])]?)?'
+    r'(?:_?[\[(]?(?P<unit>[munµμ]?s)[\])]?)?'
 )
+# Three digits behind a comma may be thousands.
 _SIZE = re.compile(
-    r'(?P<size>\d+(?:\.\d+)?(?:e[+-]?\d+)?)\s*(?P<unit>k?hz|hertz|sps|s/s|samples/s|[mun]?s)?'
+    r'(?P<size>\d+(?:\.\d+|,(?:\d\d?|\d{4,}))?(?:e[+-]?\d+)?)\s*'
+    r'(?P<unit>k?hz|hertz|sps|s/s|1/s|samples(?:/s| per second)|[munµμ]?s)?'
 )
-_HERTZ = {'': 1.0, 'hz': 1.0, 'hertz': 1.0, 'sps': 1.0, 's/s': 1.0, 'samples/s': 1.0, 'khz': 1e3}
-_SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
+_HERTZ = dict.fromkeys(('', 'hz', 'hertz', 'sps', 's/s', '1/s'), 1.0)
+_HERTZ |= {'samples/s': 1.0, 'samples per second': 1.0, 'khz': 1e3}
+_SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'µs': 1e-6, 'μs': 1e-6, 'ns': 1e-9}
 
 
-def noted_rate(notes: Mapping[str, str]) -> tuple[str, float] | None:
-    """Return what a file says of its sample rate, as it is written there, and the rate [Hz].
-
-    None where it says nothing of it, or two different things.
-    """
-    found = {
-        rate: (f'{name}{"" if name.endswith(":") else " ="} {value}', rate)
+def noted_rates(notes: Mapping[str, str]) -> dict[float, str]:
+    """Return each sample rate [Hz] that a file states, and how it is written there."""
+    return {
+        rate: f'{name}{"" if name.endswith(":") else " ="} {value}'
         for name, value in notes.items()
         if (rate := rate_of(name.removesuffix(':'), value)) is not None
     }
-    return found.popitem()[1] if len(found) == 1 else None
 
 
 def take_rate(line: str, notes: dict[str, str]) -> None:
@@ -59,11 +58,11 @@ def rate_of(name: str, value: str) -> float | None:
     said = rate or step
     if size is None or said is None:
         return None
-    unit = size['unit'] or said['unit'] or ''
-    if unit in _SECONDS and float(size['size']) > 0.0:
-        found = 1.0 / (float(size['size']) * _SECONDS[unit])
+    unit, number = size['unit'] or said['unit'] or '', float(size['size'].replace(',', '.'))
+    if unit in _SECONDS and number > 0.0:
+        found = 1.0 / (number * _SECONDS[unit])
     elif unit in _HERTZ and rate is not None:
-        found = float(size['size']) * _HERTZ[unit]
+        found = number * _HERTZ[unit]
     else:
         return None
     return found if SLOWEST_RATE <= found <= FASTEST_RATE else None

@@ -141,7 +141,19 @@ def test_beside_a_channel_map_the_hold_of_a_load_is_prose(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize('sign', [':', ' ='])
 @pytest.mark.parametrize(
-    'value', ['5 s', '5', '30 min at each level', '10 kN', '2.5 mm', '3 cycles', 'none', '']
+    'value',
+    [
+        '5 s',
+        '5',
+        '30 min at each level',
+        '10 kN',
+        '2.5 mm',
+        '3 cycles',
+        'none',
+        '',
+        '?',
+        'unknown',
+    ],
 )
 def test_the_hold_of_a_load_is_none_of_the_command(tmp_path: Path, value: str, sign: str) -> None:
     """It refused a good file; beside it the hold of the command counts, in any order."""
@@ -149,6 +161,19 @@ def test_the_hold_of_a_load_is_none_of_the_command(tmp_path: Path, value: str, s
     assert read(text(tmp_path / 'a.csv', said)).hold == 'zoh'
     for lines in ((said, ours), (ours, said), (said.replace('H', 'h'), ours)):
         assert read(text(tmp_path / 'a.csv', *lines)).hold == 'linear'
+
+
+def test_values_in_capitals_with_their_unit_and_none(tmp_path: Path) -> None:
+    """Each was refused, and says what it says."""
+    said = ['# Hold: Linear', '# stiffness_N_per_m = 250e3 N/m', '# actuator: -']
+    record = read(text(tmp_path / 'a.csv', *said))
+    assert (record.hold, record.stiffness, record.actuator) == ('linear', 250e3, 'actuator')
+    for nothing in ('unknown', 'none', '-', ''):
+        said = ['# Hold: ZOH', f'# stiffness_N_per_m = {nothing}']
+        record = read(text(tmp_path / 'a.csv', *said))
+        assert (record.hold, record.stiffness) == ('zoh', None)
+    with pytest.raises(InputError, match=r"= '250 kN/m' is not a number"):
+        read(text(tmp_path / 'a.csv', '# stiffness_N_per_m = 250 kN/m'))
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,11 @@ def text(path: Path, head: str, columns: dict[str, np.ndarray]) -> Path:
         ('Sample Rate (kHz): 2', 'Sample Rate (kHz): 2'),
         ('fs = 500 Hz', 'fs = 500 Hz'),
         ('sampling interval: 2 ms', 'sampling interval: 2 ms'),
-        ('Abtastrate: 2 kHz', 'Abtastrate: 2 kHz'),
+        ('Abtastrate: 2000,0 Hz', 'Abtastrate: 2000,0 Hz'),
+        ('sample rate [1/s]: 500', 'sample rate [1/s]: 500'),
+        ('Samples per second: 500', 'Samples per second: 500'),
+        ('dt: 2000 µs', 'dt: 2000 µs'),
+        ('sample rate: 500 samples per second', 'sample rate: 500 samples per second'),
     ],
 )
 def test_a_rate_that_the_times_contradict_is_told(tmp_path: Path, note: str, said: str) -> None:
@@ -50,10 +54,20 @@ def test_a_rate_that_the_times_contradict_is_told(tmp_path: Path, note: str, sai
     assert f"it says '{said}', and is taken at 1000 Hz, as its column of times says" in line
 
 
+def test_of_several_rates_each_that_is_another_is_told(tmp_path: Path) -> None:
+    """Two that differ said nothing."""
+    told: list[str] = []
+    head = '# fs = 500\n# sample rate: 1000 Hz\n# sampling interval: 5 ms'
+    assert read(text(tmp_path / 'a.csv', head, TIMED), warn=told.append).rate == 1000.0
+    assert ["'fs = 500'" in line for line in told] == [True, False]
+    assert "'sampling interval: 5 ms'" in told[1]
+
+
 @pytest.mark.parametrize(
     'note',
     [
         'sample rate: 1000 Hz',
+        'sample rate: 1,024 Hz',
         'Sample rate: 1 kHz',
         'sampling frequency: 1000.4 S/s',
         'dt = 0.001 s',

@@ -88,7 +88,7 @@ def _plain(content: dict[str, Any]) -> FileTable:
         columns += found
         places += [(name, i) for i in range(len(found))]
     named = ((name.rpartition('.')[2], text) for name, text in texts.items())
-    notes = {name: text for name, text in named if name in NOTES}
+    notes = {name: text for name, text in named if name in NOTES or is_rate(name)}
     for name, array in arrays.items():
         label = name.rpartition('.')[2]
         if (label == 'stiffness_N_per_m' or is_rate(label)) and array.size == 1:
