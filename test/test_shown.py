@@ -37,7 +37,7 @@ def results(record: ag.Record, posterior: ag.Calibration) -> dict[str, Any]:
     return {
         'beta_1': posterior,
         'P(unstable)': stable,
-        'use none': Comparison({'none': stable, 'ats': stable}, 'none'),
+        'no compensator': Comparison({'none': stable, 'ats': stable}, 'none'),
         'window': replayed,
         '601 samples at 100 Hz': record,
         '40 degree(s) of freedom': partition,

@@ -38,6 +38,11 @@ class Comparison:
     def summary(self) -> str:
         """Return which to use and what it buys, in one line."""
         without, chosen = self.found['none'], self.found[self.best]
+        if chosen.p_unstable.value > 0.5:
+            return (
+                'no compensator is likely to keep this test stable: the least P(unstable) is '
+                f'{chosen.p_unstable.value:.3g}, with {self.best}'
+            )
         if self.best == 'none':
             return 'use no compensator: none of them makes the test safer or closer'
         return (
@@ -52,7 +57,7 @@ class Comparison:
         from actuator_glue.report.html import Table, Text
 
         table = Table(HEADER, self.rows(), 'Compensators')
-        return as_text([Text(f'use {self.best}'), table], '`to_json()` has them')
+        return as_text([Text(self.summary()), table], '`to_json()` has them')
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each compensator, under HEADER."""

@@ -13,6 +13,7 @@ from scipy import signal, stats
 import actuator_glue as ag
 from actuator_glue.api import store
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
+from actuator_glue.api.compensation import Comparison
 from actuator_glue.cli.main import main
 from actuator_glue.hybrid.stability import share
 from actuator_glue.model import linear
@@ -289,6 +290,17 @@ def test_a_virtual_test_shows_how_far_it_is(
     assert shown == shares
     monkeypatch.setattr(command, 'progress', Mock(side_effect=AssertionError))
     assert main(['rths', 'sdof', '--posterior', path, '--draws', '70']) == 0  # nothing to show
+
+
+@pytest.mark.parametrize('best', ['none', 'ats'])
+def test_no_compensator_is_recommended_that_leaves_the_test_unstable(best: str) -> None:
+    """It said `use ats` above a column of P(unstable) = 1."""
+    found = ag.rths(structure(-0.05), posterior(), draws=10)
+    assert found.p_unstable.value == 1.0
+    compared = Comparison({'none': found, 'ats': found}, best)
+    for text in (compared.summary(), repr(compared)):
+        assert text.startswith('no compensator is likely to keep this test stable')
+        assert 'use ' not in text.splitlines()[0]
 
 
 def test_comparing_compensators_shows_how_far_it_is(
