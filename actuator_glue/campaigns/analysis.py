@@ -39,7 +39,8 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
     """
     from actuator_glue.api.calibration import calibrate
 
-    records = [(r, m.held_out) for m in task.members for r in m.records()]
+    remarks: list[str] = []
+    records = [(r, m.held_out) for m in task.members for r in m.records(remarks.append)]
     fitted = [r for r, held_out in records if not held_out]
     held = [r for r, held_out in records if held_out]
     if not fitted:
@@ -48,7 +49,7 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
         record.known_stiffness()
     wanted = task.analysis
     found = calibrate(fitted, **wanted['calibrate'])
-    row = {**_described(task, fitted), **_calibrated(found)}
+    row = {**_described(task, fitted), **_calibrated(found), 'remarks': BETWEEN.join(remarks)}
     called = source_names(r.source for r in fitted)
     stiffest = called[max(fitted, key=Record.known_stiffness).source]
     row |= _tracked(found.tracking, stiffest)

@@ -15,7 +15,7 @@ from typing import Any
 
 from actuator_glue.campaigns.recipe import SAID, FileRule, Recipe, channels_of
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import is_bag
+from actuator_glue.io.bag_reader import Note, is_bag
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.io.formats import formats
 from actuator_glue.io.load import load_records
@@ -46,22 +46,30 @@ class Member:
     held_out: bool = False
     problem: str = ''
 
-    def records(self) -> list[Record]:
+    def records(self, tell: Note | None = None) -> list[Record]:
         """Return its records.
+
+        Args:
+            tell: called with each remark on a file that can still be used.
 
         Raises:
             InputError: as `load_records`, or its name or table entry cannot be used.
         """
         if self.problem:
             raise InputError(f'{self.name}: {self.problem}')
+
+        def told(line: str) -> None:
+            if tell is not None:
+                tell(line.replace(self.path, self.name))
+
         return load_records(
             self.path,
             stiffness=self.stiffness,
             channels=channels_of(self.channels, f'{self.name}: recipe'),
             hold=None if self.hold is None else check_hold(self.hold, self.name),
             resample=self.resample,
-            gap=_unsaid if self.split else None,
-            warn=_unsaid,
+            gap=told if self.split else None,
+            warn=told,
         )
 
 
@@ -93,10 +101,6 @@ class Task:
         """Return what `to_json` wrote."""
         members = tuple(Member(**m) for m in value['members'])
         return cls(**{**value, 'members': members})
-
-
-def _unsaid(line: str) -> None:
-    """Drop a remark on a file that can still be used."""
 
 
 def files_below(given: Sequence[Path | str], rules: Sequence[FileRule]) -> Iterator[Member]:

@@ -44,7 +44,8 @@ def run(args: argparse.Namespace) -> int:
     content = {'schema': 'actuator_glue.comparison/1', **asdict(found)}
     failed = beside(args.json, lambda out: write_json(content, out))
     say(found.summary(), args)
-    title = f'{args.b} ({len(found.b)} days) over {args.a} ({len(found.a)} days)'
+    sides = ((args.b, found.b), (args.a, found.a))
+    title = ' over '.join(f'{n} ({len(d)} day{"s" * (len(d) != 1)})' for n, d in sides)
     table(title, HEADER, [d.row() for d in found.differences], args)
     for line in found.notes:
         note(line)

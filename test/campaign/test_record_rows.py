@@ -91,6 +91,21 @@ def test_a_delay_that_was_named_is_in_the_margin(folder: Path) -> None:
     assert margins[0] - margins[1] == pytest.approx(4e-3, abs=0.5e-3)
 
 
+def test_remarks_on_files_are_in_the_row(folder: Path, tmp_path: Path) -> None:
+    """They were dropped; the folder that the files are in is no part of a row."""
+    copies = tmp_path / 'copies'
+    copies.mkdir()
+    for file in folder.glob('*.csv'):
+        said = '# sample rate: 1024 Hz\n' * file.name.endswith('_free.csv')
+        (copies / file.name).write_text(said + file.read_text())
+    (task,) = tasks_of([copies], parse_recipe({**RECIPE, 'draws': False}, copies))
+    row = analysed(task, tmp_path, 'k')
+    assert "_free.csv: it says 'sample rate: 1024 Hz', and is taken at 100 Hz" in row['remarks']
+    assert str(tmp_path) not in row['remarks'] and row['remarks'].count('it says') == 1
+    (task,) = tasks_of([folder], parse_recipe({**RECIPE, 'draws': False}, folder))
+    assert analysed(task, tmp_path, 'k')['remarks'] == ''
+
+
 def test_what_is_held_out_is_not_fitted(folder: Path, tmp_path: Path) -> None:
     """One record left is one record; none left is a reason."""
     some = parse_recipe({**RECIPE, 'holdout': '*_free.*', 'draws': False}, folder)
