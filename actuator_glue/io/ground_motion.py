@@ -51,6 +51,8 @@ _SAID = re.compile(r'\bunits?(?:\s+of\s+|\s*[:=]\s*)(.+)', re.IGNORECASE)
 _IN_PROSE = re.compile(r'(?<!peak )(?<!max )(?<!max\. )\baccel\w*\.?\s+in\s+([^\s,;()]+)', re.I)
 _LAST = re.compile(r',\s*([^\s,;()]+)\s*$', re.MULTILINE)  # `Record of El Centro, g`
 _ABOUT = re.compile(r'time|acc\w*|and|in|of|is|are', re.IGNORECASE)  # words among units
+# No earthquake is recorded in minutes, and `h` is a direction.
+_TIMES = {unit: seconds for unit, seconds in ROLES['time'].items() if seconds <= 1.0}
 _NOT_SECONDS = re.compile(
     r'min(?:utes?)?|h|hrs?|hours?|d|days?|samples?|steps?|ticks?|frames?|h+:m+.*', re.IGNORECASE
 )
@@ -130,7 +132,7 @@ def _listed(line: str) -> tuple[str, str]:
     time = ''
     for word in re.split(r'[\s,;()]+', line):
         bare = word.strip('[](){}.:"\'')
-        if symbol(bare) in ROLES['time'] and not time:
+        if symbol(bare) in _TIMES and not time:
             time = symbol(bare)
         elif bare == 'SI' or _plain(bare) in _UNITS or _like_a_unit(bare):
             return time, bare
@@ -255,8 +257,8 @@ def _seconds(path: Path, name: str) -> float | None:
     """
     words = [*_BRACKETS.findall(name), *re.split(r'[_/\s]+', _BRACKETS.sub(' ', name))[1:]]
     for word in words:
-        if symbol(word) in ROLES['time']:
-            return ROLES['time'][symbol(word)]
+        if symbol(word) in _TIMES:
+            return _TIMES[symbol(word)]
         if _NOT_SECONDS.fullmatch(word) or _like_a_unit(word):
             raise InputError(
                 f'{path}: column {name!r} has a unit of time that is not understood; use s or ms'
@@ -285,8 +287,8 @@ def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple
     for line in heading:
         pair = _pair(line)
         bare = pair[0].strip('[](){} ') if pair is not None else ''
-        if pair is not None and bare in ROLES['time'] and _plain(pair[1]) in _UNITS:
-            seconds.add(ROLES['time'][bare])  # a line of units
+        if pair is not None and bare in _TIMES and _plain(pair[1]) in _UNITS:
+            seconds.add(_TIMES[bare])  # a line of units
             factors[pair[1]] = _factor(path, pair[1])
             continue
         timed = pair is not None and _TIME.match(pair[0]) is not None
@@ -316,7 +318,7 @@ def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple
             f'its unit is named; {_MEND}'
         )
     listed = [_listed(line)[0] for line in _SAID.findall('\n'.join(rest))]
-    seconds |= {ROLES['time'][unit] for unit in listed if unit}
+    seconds |= {_TIMES[unit] for unit in listed if unit}
     if len(seconds) > 1:
         raise InputError(f'{path}: the heading says two units of time; keep the one that it is in')
     if len(set(factors.values())) > 1:
