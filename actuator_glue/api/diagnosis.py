@@ -340,9 +340,9 @@ class DiagnosisChanges(TypedDict, total=False):
 @takes(DiagnosisOptions)
 def diagnose(
     records: Records,
+    holdout: Records | None = None,
     options: DiagnosisOptions | None = None,
     *,
-    holdout: Records | None = None,
     stiffness: Stiffness = None,
     progress: Progress | bool | None = None,
     first_look: Callable[[FirstLook], None] | None = None,
@@ -353,10 +353,10 @@ def diagnose(
 
     Args:
         records: one or several tests of one actuator, each with its specimen stiffness, or the
-            files they are in.
-        options: those below as one object; None for their defaults.
+            files they are in; several go into one list.
         holdout: record(s) that decide nothing and give the error before and after; without one,
             every fourth block of each record is set aside before any look.
+        options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m] of the records, one for all or one for each; None for
             what they and their files say.
         progress: called with (stage, share of the whole that is done, in [0, 1]); True for a bar,
@@ -373,8 +373,7 @@ def diagnose(
         InputError: stiffness not known, records too short, channels that cannot belong together,
             or an option that cannot be used.
     """
-    held_out = '; what is held out goes by name: holdout=earthquake'
-    options = chosen(DiagnosisOptions, options, changes, 'diagnose', held_out)
+    options = chosen(DiagnosisOptions, options, changes, 'diagnose')
     started = time.perf_counter()
     given = records_given(records, stiffness)
     held = [] if holdout is None else records_given(holdout, name='holdout')

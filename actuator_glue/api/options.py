@@ -19,11 +19,7 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 
 
 def chosen(
-    kind: type[Options],
-    options: Options | None,
-    changes: Mapping[str, Any],
-    function: str,
-    hint: str = '',
+    kind: type[Options], options: Options | None, changes: Mapping[str, Any], function: str
 ) -> Options:
     """Return options with some of them replaced.
 
@@ -32,7 +28,6 @@ def chosen(
         options: what was given as one object; None for the defaults.
         changes: what was given by name.
         function: whose options they are, for messages.
-        hint: said behind the message where no options were given in their place.
 
     Raises:
         InputError: options of another kind, no such option, or a value that cannot be used.
@@ -43,7 +38,7 @@ def chosen(
         'options',
         kind,
         f'{kind.__name__}, or each option by name; several records go into one list, as in '
-        f'{function}([free, clamped]){hint}',
+        f'{function}([free, clamped])',
     )
     known = [f.name for f in fields(options)]
     unknown = sorted(set(changes) - set(known))
