@@ -14,6 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
+from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.thresholds import SETUP_FAR, TELLING, Thresholds
@@ -149,6 +150,10 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     some = stretched(data)
     given = given or base_fit(some)
     stroke = scale(some.records, given.theta).stroke
+    left, noise = pooled(some, splits_of(some, given.error))
+    # Under a stationary command structure passes for noise: there, little of it says nothing.
+    if left < settings.material(noise, stroke) and not any(forecast.stationary(some)):
+        return None
     others = list(_others(data))
     parts = [stretched(other) for other in others]
     ways = [(p, base_fit(p)) for p in parts]
