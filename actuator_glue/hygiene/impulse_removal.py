@@ -169,11 +169,11 @@ def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[s
     return (replace(data, records=tuple(records)) if notes else data), notes
 
 
-def _told_frozen(found: Frozen, whole: Record, how: str, while_: str, what: str) -> str:
+def _told_frozen(found: Frozen, whole: Record, how: str, when: str, what: str) -> str:
     sizes = found.last + 1 - found.first
     return (
         f'the measured displacement {how} {len(sizes)} time{"s" if len(sizes) > 1 else ""} '
-        f'{while_} ({int(sizes.sum())} of {len(whole)} samples, up to '
+        f'{when} ({int(sizes.sum())} of {len(whole)} samples, up to '
         f"{1e3 * float(sizes.max()) * whole.period:.3g} ms): {what}; the model's motion stands in "
         'their place'
     )
