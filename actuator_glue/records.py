@@ -463,7 +463,8 @@ class Record:
             where = f'{self.source}: ' if self.source else ''
             raise InputError(
                 f'{where}specimen stiffness is not known; give it with --stiffness N/m, 0 for a '
-                'free actuator; `calibrate --stiffness unknown` tells what holds without it'
+                'free actuator; `calibrate --stiffness unknown` tells what holds without it, as '
+                '`combinations` does in Python'
             )
         return self.stiffness
 

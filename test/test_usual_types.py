@@ -328,6 +328,15 @@ def test_the_home_folder_is_found(
             api.load(name)
 
 
+def test_an_unknown_stiffness_is_said_as_on_the_command_line(record: ag.Record) -> None:
+    """It was called no number; what a record says is left aside."""
+    with pytest.raises(InputError, match=r'is not known; .*`combinations` does in Python'):
+        api.calibrate(record, stiffness='unknown')
+    known = replace(record, stiffness=2e3)
+    (given,) = records_given(known, cast('Any', 'unknown'))
+    assert given.stiffness is None
+
+
 def test_what_else_fails_is_refused_by_name(
     posterior: ag.Calibration, file: Path, record: ag.Record, tmp_path: Path
 ) -> None:

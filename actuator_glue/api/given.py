@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import timedelta
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from actuator_glue.records import Record
 
 OneRecord: TypeAlias = Record | os.PathLike[str] | str
 Records: TypeAlias = OneRecord | Iterable[OneRecord]
-Stiffness: TypeAlias = float | Sequence[float] | None
+Stiffness: TypeAlias = float | Literal['unknown'] | Sequence[float | Literal['unknown']] | None
 
 
 def records_given(
@@ -28,7 +28,7 @@ def records_given(
     Args:
         given: one or several.
         stiffness: specimen stiffness [N/m], one for all or one for each that was given; None for
-            what records and files say.
+            what records and files say, which 'unknown' leaves aside.
         name: of the argument, for messages.
 
     Raises:
@@ -52,7 +52,8 @@ def records_given(
     out: list[Record] = []
     for one, k in zip(some, known, strict=True):
         if isinstance(one, Record):
-            out.append(one if k is None else replace(one, stiffness=k))
+            told = None if isinstance(k, str) and k == 'unknown' else k
+            out.append(one if k is None else replace(one, stiffness=told))
         elif isinstance(one, (str, os.PathLike)):
             out += load_records(os.fspath(one), stiffness=k)
         else:
