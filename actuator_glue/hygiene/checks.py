@@ -10,7 +10,7 @@ import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.slow_gain import slow_gain, told
-from actuator_glue.records import Array, Record
+from actuator_glue.records import STIFF, Array, Record
 from actuator_glue.velocity_command import is_velocity
 
 _SMALLEST = 5e-6  # m of command, from end to end: below it is no test of an actuator
@@ -120,7 +120,9 @@ def _reaches(record: Record) -> None:
             leakage explains.
     """
     gain = slow_gain(record)
-    least = _DROOPS if record.known_stiffness() else 1.0 / _OFF
+    k = record.known_stiffness()
+    # What leakage leaves of slow motion falls with the force that the specimen takes for it.
+    least = 1.0 / (1.0 + (1.0 / _DROOPS - 1.0) * max(k / STIFF, 1.0)) if k else 1.0 / _OFF
     if gain is not None and not least < gain < _OFF:
         raise InputError(
             f'{record.source}: {told(gain)}; check the units of both channels (`unit` in a '

@@ -7,9 +7,11 @@ import pytest
 from online_streams import RATE, block, record, setup, stream
 
 from actuator_glue.model import linear
+from actuator_glue.model.commands import noise
 from actuator_glue.online.channels import ChannelFault, fault
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.windows import SlidingWindows
+from actuator_glue.records import Record
 
 GOOD = record(5.0)
 PUSHES = replace(GOOD, force=250e3 * GOOD.measured)
@@ -117,6 +119,22 @@ def test_a_fault_stands_from_two_stretches_on_until_one_is_good():
         channels.take(found)
         said.append(channels.fault)
     assert said == ['', '', 'swapped by 4 ms', 'swapped by 4 ms', 'swapped by 4 ms', '', '']
+
+
+@pytest.mark.parametrize('stiffness', [5e6, 20e6])
+def test_a_specimen_stiffer_than_the_oil_is_no_other_unit(stiffness):
+    """A fifth of such stretches seemed of other units; with a force, a real one is found."""
+    rng, odd = np.random.default_rng(3), 0
+    for seed in range(20):
+        theta = rng.uniform([80.0, 6e8, 1.5e5, 0.5], [200.0, 1.8e9, 4e5, 6.0])
+        command = noise(RATE, 12.0, 0.2, 8.0, seed=seed)
+        clean = linear.simulate(theta, command, stiffness=stiffness, period=1.0 / RATE)
+        measured = clean + 1e-6 * rng.standard_normal(len(clean))
+        whole = Record(command, measured, 1.0 / RATE, stiffness, force=stiffness * clean)
+        stretch = whole.slice(1000, 2000)
+        assert fault(stretch) in ('', None)
+        odd += bool(fault(replace(stretch, measured=stretch.measured / 25.4)))
+    assert odd > 15
 
 
 @pytest.mark.parametrize('force', [True, False])
