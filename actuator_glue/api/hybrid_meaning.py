@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_glue.api.frequency_response import Limits
 from actuator_glue.api.partition_given import partition_given
+from actuator_glue.hybrid.coupled import coupled
 from actuator_glue.hybrid.margin import pure_delay_margin
 from actuator_glue.hybrid.partition import Partition
 
@@ -29,7 +30,7 @@ def hybrid_meaning(
         InputError: a partition that cannot be used.
     """
     partition = partition_given(partition)
-    lowest = float(min(partition.natural_frequencies))
+    lowest = float(min(coupled(partition).natural_frequencies))
     delay = delay_at(partition.specimen.stiffness, lowest)
     middle, low, high = (1e3 * float(values[0]) for values in delay)
     margin = 1e3 * pure_delay_margin(partition)[1]
