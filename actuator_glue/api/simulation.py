@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -138,7 +139,7 @@ def simulate(
     words = seed if isinstance(seed, tuple) else (seed_given(seed), 0)
     sequence = np.random.SeedSequence(tuple(seed_given(word) for word in words))
     draw = int(sequence.generate_state(1)[0])
-    known = check_stiffness(stiffness)
+    known, sent = check_stiffness(stiffness), samples
     if plant == 'benchmark':
         if effects or theta is not None or known:
             raise InputError(
@@ -148,7 +149,7 @@ def simulate(
         known = benchmark_plant.BenchmarkParameters().stiffness
         moved = _benchmark(rate, hold, draw, sensors)
     else:
-        structure, values = sizes(effects, theta)
+        structure, values, sent = _early(*sizes(effects, theta), samples, 1.0 / rate)
         moving = Stream(
             structure,
             values,
@@ -168,7 +169,7 @@ def simulate(
     measured, force = np.empty(len(samples)), np.empty(len(samples))
     for start in range(0, len(samples), BLOCK):
         part = slice(start, min(start + BLOCK, len(samples)))
-        measured[part], force[part] = moved.step(samples[part])
+        measured[part], force[part] = moved.step(sent[part])
     return Record(
         samples,
         measured,
@@ -179,6 +180,24 @@ def simulate(
         actuator='simulated',
         source='simulated' if seed is not None else f'simulated with seed {words[0]}',
     )
+
+
+def _early(
+    structure: Structure, values: Array, samples: Array, period: float
+) -> tuple[Structure, Array, Array]:
+    """Return a plant that leads its command as one that is late for a command sent before.
+
+    A stream cannot run ahead of its command; of a whole command each sample is known before.
+    """
+    known = dict(zip(structure.names, values.tolist(), strict=True))
+    if 'lead' not in known:
+        return structure, values, samples
+    lead = known.pop('lead')
+    count = math.ceil(lead / period)
+    known['delay'] = known.get('delay', 0.0) + count * period - lead
+    late = Structure({'delay', *structure.effects} - {'lead'})
+    sent = np.concatenate([samples[count:], np.full(count, samples[-1])])[: len(samples)]
+    return late, np.array([known[name] for name in late.names]), sent
 
 
 def samples_of(command: Command | Record) -> Array:

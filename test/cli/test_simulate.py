@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_glue.api.simulation import Command, simulate, sizes
+from actuator_glue.api.simulation import Command, Sensors, simulate, sizes
 from actuator_glue.io.load import load_records
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.records import Hold
 
 
 def test_simulated_bag_holds_what_was_asked(run, short_bag: Path) -> None:
@@ -143,6 +144,18 @@ def test_an_effect_is_the_same_machine_under_every_command(run, tmp_path: Path) 
         assert float(told[2]) == pytest.approx(1e6 * found[name], rel=0.01)
     assert len(set(found.values())) == 1
     assert 2e-5 < found['usual'] < 1e-4
+
+
+@pytest.mark.parametrize('hold', ['zoh', 'linear'])
+@pytest.mark.parametrize('lead', [0.0034, 0.0123])
+def test_a_displacement_ahead_of_its_command_is_simulated(lead: float, hold: Hold) -> None:
+    """Less and more than a sample: as the model does, which knows the whole command."""
+    given = {'lead': {'lead': lead}}
+    command = Command(rate=200.0, duration=6.0, amplitude=3e-3)
+    record = simulate(command, effects=given, sensors=Sensors(noise=0.0), hold=hold, seed=1)
+    structure, values = sizes(given)
+    again = np.ravel(structure.simulate(values, record))
+    np.testing.assert_allclose(again, record.measured, atol=1e-7)
 
 
 @pytest.mark.parametrize('name', sorted(CATALOGUE))

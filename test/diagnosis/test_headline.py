@@ -266,7 +266,7 @@ def test_only_what_the_held_out_part_bears_out_is_applied() -> None:
     effect = finding('backlash')
     good = replace(diagnosis('missing-effect', 40e-6, 10e-6, effect), structure=('backlash',))
     assert refused(good) == ''
-    assert 'one record' in refused(replace(good, effects=(replace(effect, records=('a',)),)))
+    assert 'not act in all' in refused(replace(good, effects=(replace(effect, records=('a',)),)))
     doubtful = replace(good.error, removed_ci=(-0.1, 0.5))
     assert 'exclude zero' in refused(replace(good, error=doubtful))
     assert refused(replace(good, verdict='undecided'))
