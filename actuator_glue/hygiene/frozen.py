@@ -40,10 +40,14 @@ def repeats(values: Array) -> Frozen:
 
 
 def lines(values: Array) -> Frozen:
-    """Return where a channel (n,) runs on a straight line without noise, from value to value."""
+    """Return where a channel (n,) runs on a straight line without noise, from value to value.
+
+    Nowhere, where it does so usually: it is coarse, or was drawn between slower readings.
+    """
     bend = np.abs(np.diff(values, 2))
-    moves = values[2:] != values[:-2]
-    first, last = _runs(moves & (bend <= _BENT * np.median(bend)))
+    usual = float(np.median(bend))
+    moves = (values[2:] != values[:-2]) & (usual > _STEPS * _grid(values))
+    first, last = _runs(moves & (bend <= _BENT * usual))
     long = last - first >= _STRAIGHT - 1
     return Frozen(first[long] + 1, last[long] + 1)
 
@@ -63,12 +67,10 @@ def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
         output: of a model that was fitted, at the same times, (n,) [m].
     """
     y, first, last = record.measured, repeated.first - 1, repeated.last
-    steps = np.abs(np.diff(y))
-    grid = float(steps[steps > 0.0].min(initial=np.inf))
     edges = np.stack([first, last + 1], axis=1).ravel()
     edges = edges[edges < len(y)]
     motion = np.maximum.reduceat(output, edges) - np.minimum.reduceat(output, edges)
-    far = motion[::2] > max(_BEYOND * _noise(y - output), _STEPS * grid)
+    far = motion[::2] > max(_BEYOND * _noise(y - output), _STEPS * _grid(y))
     far &= (y[last] > y.min()) & (y[last] < y.max())  # else it is at an end of its range
     return Frozen(repeated.first[far], last[far])
 
@@ -87,6 +89,11 @@ def while_bending(lines: Frozen, record: Record, output: Array) -> Frozen:
     # Slow motion without noise is nearly straight, and so is its model.
     far = bends > np.maximum(_DEPARTING * noise, _BEYOND * own)
     return Frozen(lines.first[far], lines.last[far])
+
+
+def _grid(values: Array) -> float:
+    steps = np.abs(np.diff(values))
+    return float(steps[steps > 0.0].min(initial=np.inf))
 
 
 def _noise(error: Array) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.samples.preparation import prepare
+from actuator_glue.hygiene.frozen import lines
 from actuator_glue.hygiene.impulse_removal import despiked
 from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.model.structure import Structure
@@ -70,3 +71,15 @@ def test_a_piston_that_stands_still_is_no_frozen_channel(
     y = np.round(x / grid) * grid if grid else x
     record = replace(machine(1000.0, 2)[0], measured=y)
     assert not any('frozen' in n or 'filled' in n for n in prepare([record], []).notes)
+
+
+@pytest.mark.parametrize(('every', 'grid'), [(5, 0.0), (10, 1e-6), (1, 50e-6)])
+def test_a_channel_that_usually_runs_straight_has_no_gap(every: int, grid: float) -> None:
+    """Drawn between slower readings, or coarse, it was told of as filled in here and there."""
+    record, _ = machine(500.0, 2)
+    y = np.round(record.measured / grid) * grid if grid else record.measured
+    y = np.interp(record.time, record.time[::every], y[::every])
+    assert not len(lines(y).first)
+    gap = record.measured.copy()
+    gap[5000:5040] = np.linspace(gap[5000], gap[5040], 40, endpoint=False)
+    assert len(lines(gap).first) == 1
