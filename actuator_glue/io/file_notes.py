@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.noted_rate import is_rate, plain, rate_of
+from actuator_glue.io.noted_rate import add_rate, is_rate, plain, rate_of
 
 # What is understood, and what each is written as.
 NOTES = {
@@ -128,7 +128,7 @@ def take_note(comment: str, notes: dict[str, str], where: str) -> bool:
 
 
 def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
-    """Add what a file says under a name; of what is not meant for us the last counts.
+    """Add what a file says under a name; of what is not meant for us the last counts, no rate.
 
     Raises:
         InputError: one of `NOTES` is said twice, differently.
@@ -139,7 +139,10 @@ def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
             return
         if before != value:
             raise InputError(f'{where}: {name} is said twice, {before!r} and {value!r}; keep one')
-    notes[name] = value
+    if is_rate(name.removesuffix(':')):
+        add_rate(notes, name, value)
+    else:
+        notes[name] = value
 
 
 def _states(name: str, value: str) -> bool:

@@ -145,7 +145,8 @@ def _file(path: Path) -> FileLook:
     blocks: list[SampleRows] = []
     if chosen is formats()['.csv']:
         layout, places, blocks = text_layout(path)
-        unknown = ChannelMap(Channel(1, 'm'), Channel(2, 'm'), rate=1.0)
+        # With times comments among the rows are passed over; without, the layout ends there.
+        unknown = ChannelMap(Channel(1, 'm'), Channel(2, 'm'), time=Channel(1, 's'))
         channels = replace(unknown, **layout)
     table = chosen.read(path, channels)
     columns = table.columns

@@ -21,6 +21,7 @@ _SIZE = re.compile(
     r'(?P<size>\d+(?:\.\d+|,(?:\d\d?|\d{4,}))?(?:e[+-]?\d+)?)\s*'
     r'(?P<unit>k?hz|hertz|sps|s/s|1/s|samples(?:/s| per second)|[munµμ]?s)?'
 )
+_GROUPED = re.compile(r'\d{1,3}\.\d{3}(?!\d)')
 _HERTZ = dict.fromkeys(('', 'hz', 'hertz', 'sps', 's/s', '1/s'), 1.0)
 _HERTZ |= {'samples/s': 1.0, 'samples per second': 1.0, 'khz': 1e3}
 _SECONDS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'µs': 1e-6, 'μs': 1e-6, 'ns': 1e-9}
@@ -40,7 +41,18 @@ def take_rate(line: str, notes: dict[str, str]) -> None:
     name, *behind = re.split(r'[:=,;\t]', line.replace('"', ''), maxsplit=1)
     value = ' '.join(re.split(r'[\s,;]+', ''.join(behind).strip(' \t,;')))
     if rate_of(name, value) is not None:
-        notes[f'{name.strip()}:'] = value
+        add_rate(notes, f'{name.strip()}:', value)
+
+
+def add_rate(notes: dict[str, str], name: str, value: str) -> None:
+    """Add what a file says of its sample rate; said twice, differently, it is no rate."""
+    before = notes.get(name, value)
+    notes[name] = value if before == value else f'{before} and {value}'
+
+
+def may_be_thousands(name: str, value: str) -> bool:
+    """Return whether a rate beside decimal commas may have a point for thousands: `10.000 Hz`."""
+    return is_rate(name.removesuffix(':')) and _GROUPED.match(value) is not None
 
 
 def is_rate(name: str) -> bool:

@@ -9,15 +9,17 @@ from typing import Any, NamedTuple
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats.delimited import (
     DELIMITERS,
+    TextHead,
     fields_of,
     is_number,
     is_remark,
     is_stamp,
+    names_index,
     read_head,
     uncommented,
 )
 from actuator_glue.io.signature import open_text
-from actuator_glue.io.units import kinds_line, units_line
+from actuator_glue.io.units import bare, kinds_line, units_line
 
 _LOOK = 300  # lines in which the samples must begin
 _ABOVE = 6  # lines above the samples in which their names and units are
@@ -63,7 +65,9 @@ def text_layout(path: Path) -> TextLayout:
         raise InputError(f'{path}: no rows of at least two numbers in the first {_LOOK} lines')
     # A wrong delimiter leaves entries that are no numbers.
     best = max(found, key=lambda rows: 2 * len(rows.numbers) - rows.filled)
-    blocks, follows = _blocks(path, best)
+    blocks, follows = _blocks(path, best, is_timed=False)
+    if follows and _is_timed(read_head(path, blocks[0].lines)):
+        blocks, follows = _blocks(path, best, is_timed=True)
     chosen = max(blocks, key=lambda block: block.rows)
     entries: dict[str, Any] = {'header_lines': chosen.lines}
     if follows:
@@ -74,14 +78,19 @@ def text_layout(path: Path) -> TextLayout:
     return TextLayout(entries, best.numbers, blocks)
 
 
-def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
+def _is_timed(head: TextHead) -> bool:
+    return bool(head.stamps) or any(bare(name) == 'time' for name in head.names)
+
+
+def _blocks(path: Path, like: _Rows, *, is_timed: bool) -> tuple[list[SampleRows], bool]:
     """Return the blocks of rows shaped like the first ones, and whether anything follows a block.
 
-    A line of units above a block belongs to it: the reader finds such a line by itself.
+    A line of units above a block belongs to it: the reader finds such a line by itself. Comments
+    among rows with times end no block: only a clock tells that none stands for a sample.
     """
     found: list[SampleRows] = []
     above: list[tuple[int, list[str]]] = []
-    first, rows, empty, follows = 0, 0, 0, False
+    first, rows, empty, follows, last = 0, 0, 0, False, ''
     with open_text(path, errors='replace') as file:
         for at, line in enumerate(file):
             if at < like.first - _ABOVE:
@@ -97,14 +106,18 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
                 rows += 1 + (empty if rows else 0)
                 empty = 0
                 continue
+            if rows and is_timed and is_remark(line, like.delimiter, len(like.numbers)):
+                continue
             if rows:
                 found.append(SampleRows(first, rows))
                 rows, follows, above = 0, True, []
-            if rows and is_remark(line, like.delimiter, len(like.numbers)):
-                continue
             empty = 0
             text = uncommented(line.rstrip('\r\n'))
-            above = [*above[-2:], (at, fields_of(text, like.delimiter))]
+            if above and names_index(text, last):
+                above = above[-1:]  # which has the other names
+            else:
+                above = [*above[-2:], (at, fields_of(text, like.delimiter))]
+            last = text
     if rows:
         found.append(SampleRows(first, rows))
     return found, follows

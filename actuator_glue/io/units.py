@@ -234,6 +234,9 @@ def written_unit(name: str) -> str:
 
     In brackets, behind `_`, `/`, a comma or a blank: `Sollweg [mm]`, `cmd_mm_filtered`, `F / kN`.
     """
+    role, unit = recognise(name) or ('', '')
+    if unit in ROLES.get(role, ()):
+        return symbol(unit)
     inside = [text for text in _BRACKETS.findall(name) if not _PLACE.fullmatch(text)]
     for text in inside:
         if text in _KNOWN:

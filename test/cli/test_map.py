@@ -41,6 +41,18 @@ def write(path: Path, head: str, columns: list[np.ndarray], delimiter: str = ','
     return path
 
 
+@pytest.mark.parametrize(('unit', 'seconds'), [('h', 3600.0), ('min', 60.0), ('ms', 1e-3)])
+def test_the_unit_in_the_name_of_a_clock_is_taken(
+    tmp_path: Path, unit: str, seconds: float
+) -> None:
+    """Of `time_h` a map said seconds, though the file was read without one."""
+    columns = [TIME / seconds, *channels()[:2]]
+    rows = [','.join(map(repr, row)) for row in np.column_stack(columns).tolist()]
+    path = tmp_path / 'a.csv'
+    path.write_text('\n'.join([f'time_{unit},command_mm,measured_mm', *rows]) + '\n')
+    assert looked(tmp_path, path)['channels']['time']['unit'] == unit
+
+
 def test_a_rate_that_the_clock_contradicts_is_no_answer(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -193,3 +193,37 @@ def test_other_formats_state_it_as_well(
     assert 'no column of times' in str(told[0].message)
     assert told[0].filename == __file__  # the line of whoever asked
     assert record.stiffness == (250e3 if make is scalar else None)
+
+
+@pytest.mark.parametrize(
+    ('head', 'decimal', 'rate'),
+    [
+        ('# Abtastrate: 10.000 Hz', ',', None),
+        ('# Abtastrate: 1000,0 Hz', ',', 1000.0),
+        ('# Abtastrate: 10.000 Hz', '.', 10.0),
+        ('# sample rate: 1000\n# sample rate: 500', '.', None),
+        ('# sample rate: 1000\n# sample rate: 1000', '.', 1000.0),
+    ],
+)
+def test_a_rate_that_may_mean_two_is_none(
+    tmp_path: Path, head: str, decimal: str, rate: float | None
+) -> None:
+    """A point beside decimal commas may part thousands; of two rates the last one counted."""
+    path = tmp_path / 'a.csv'
+    rows = np.column_stack(list(MOVED.values()))
+    np.savetxt(path, rows, fmt='%.6f', delimiter=';', header=';'.join(MOVED), comments='')
+    path.write_text(f'{head}\n{path.read_text().replace(".", decimal)}')
+    if rate is None:
+        with pytest.raises(InputError, match='no column for time'):
+            read(path)
+    else:
+        assert read(path, warn=lambda _: None).rate == rate
+
+
+@pytest.mark.parametrize('hold', [1.0, True, 5.0])
+def test_a_number_called_hold_in_hdf5_is_none_of_a_command(tmp_path: Path, hold: object) -> None:
+    """A dataset of one number refused the file."""
+    with h5py.File(tmp_path / 'a.h5', 'w') as file:
+        file.update(TIMED)
+        file['hold'] = hold
+    assert read(tmp_path / 'a.h5').hold == 'zoh'

@@ -69,12 +69,14 @@ def shown(kind: str) -> str:
         'other names in front': frame[['command_mm', 'time_s', 'measured_mm', 'force_N']],
         'a column that counts': frame.assign(sample=range(COUNT))[['sample', *NAMES]],
         'blanks in names': frame.set_axis(blanks, axis='columns'),
+        'a blank in one name': frame.assign(**{'P1 bar': FORCE}),
     }
     return frames[kind].to_string()
 
 
 SHOWN = ['numbers in front', 'from another row on', 'every other number', 'a name of the index']
 SHOWN += ['times as index', 'other names in front', 'a column that counts', 'blanks in names']
+SHOWN += ['a blank in one name']
 
 
 @pytest.mark.parametrize('end', ['', '\n', '\r\n'])
@@ -84,6 +86,14 @@ def test_what_pandas_prints_is_read(tmp_path: Path, kind: str, end: str) -> None
     text = shown(kind).replace('\n', end or '\n') + end
     (tmp_path / 'a.txt').write_bytes(text.encode())
     check(tmp_path / 'a.txt')
+
+
+@pytest.mark.parametrize('index', ['time_s', 'Time [s]', 'no'])
+def test_a_map_of_what_pandas_prints_has_its_names(tmp_path: Path, index: str) -> None:
+    """The line with the name of the index was taken for that of all."""
+    frame = pd.DataFrame(dict(zip(NAMES[1:], COLUMNS[1:], strict=True)))
+    frame.set_axis(pd.Index(TIME, name=index)).to_string(tmp_path / 'a.txt')
+    assert [column.name for column in look(tmp_path / 'a.txt').columns] == [index, *NAMES[1:]]
 
 
 def test_numbers_that_do_not_stand_below_the_names_are_refused(tmp_path: Path) -> None:
@@ -221,6 +231,9 @@ def test_comments_among_the_samples(tmp_path: Path) -> None:
     for some in ([*rows, *end], [*ROWS, *end], [['# begin'], *ROWS]):
         check(table(tmp_path / 'a.csv', some))
         assert main(['map', str(tmp_path / 'a.csv')]) == 0
+        assert 'rows' not in look(tmp_path / 'a.csv').layout
+        sentence = [['# stopped by operator at 08:00']]
+        check(table(tmp_path / 'a.csv', [*some, *sentence], by=' '))
     with pytest.raises(InputError, match='line 22'):
         read(table(tmp_path / 'a.csv', [*ROWS[:20], ['# 0.020', *ROWS[20][1:]], *ROWS[21:]]))
     untimed = parse_channel_map(

@@ -17,7 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.file_notes import take_note
 from actuator_glue.io.formats import Column, FileTable, Format
-from actuator_glue.io.noted_rate import take_rate
+from actuator_glue.io.noted_rate import may_be_thousands, take_rate
 from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import EXAMPLE, bare, is_unit, kinds_line, units_line
 from actuator_glue.records import Array
@@ -50,6 +50,8 @@ _STAMP = re.compile(
     re.ASCII | re.IGNORECASE,
 )
 _ZERO = re.compile(r'[.,]\d*0(?:e|$)', re.IGNORECASE)  # a number written with all its digits
+# What parts names with blanks within them, as in `Time [s]  Command [mm]`.
+_BLANKS, _NO_BRACKET = re.compile(r'\s{2,}'), re.compile(r'\s+(?![\[(\s])')
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _OPEN = re.compile(r'(?:^|[;\t,|])\s*"[^"]*$')  # a quoted entry that does not end in its line
@@ -156,6 +158,8 @@ def read_head(
     _refuse_left_out(path, top, header_lines)
     widths = {len(row) for row in table}
     names = _names(line, delimiter, widths)
+    if delimiter is None and len(names) == max(widths) and _behind_index(line, rows, table):
+        names = _BLANKS.split(line.strip())
     width = max(widths)
     if len(names) in widths or all(map(_REMARKS.search, names[width:] or [''])):
         width = len(names)
@@ -168,6 +172,8 @@ def read_head(
     units = [*units, *[''] * (width - len(units))][:width]
     sign = decimal or _decimal([entry for row in table for entry in row])
     stamps = frozenset(at for at, entry in enumerate(table[0]) if is_stamp(entry))
+    if sign == ',':
+        notes = {n: v for n, v in notes.items() if not may_be_thousands(n, v)}
     return TextHead(
         aligned, units, header_lines, delimiter, notes, sign, width, least, len(names), stamps
     )
@@ -231,19 +237,23 @@ def _below_names(
         entries = fields_of(text, by)
         if units := units_line(entries):
             return below + 1, line, units
-        numbers, first = sum(map(is_number, entries)), text.rstrip()
+        numbers = sum(map(is_number, entries))
         # A number behind a `#` may be that of a sample.
         if _COMMENT.match(top[below]) and (
             numbers < 2 or len(entries) != len(fields_of(line, by))
         ):
             take_note(text, notes, str(path))
             at = below + 1
-        elif first and not numbers and not line[: len(first)].strip():
-            # pandas writes the name of the index below the others.
-            return below + 1, first + line[len(first) :], []
+        elif not numbers and names_index(text, line):
+            return below + 1, text.rstrip() + line[len(text.rstrip()) :], []
         elif text.strip(_NOTHING):
             break
     return at, line, []
+
+
+def names_index(text: str, names: str) -> bool:
+    """Whether a line stands below the blanks in front of the names, as pandas prints an index."""
+    return text.strip() != '' and not names[: len(text.rstrip())].strip()
 
 
 def _broken(lines: list[str]) -> bool:
@@ -302,12 +312,22 @@ def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
         whole = re.split(re.escape(delimiter) + r'(?![^()\[\]]*[)\]])', line)
         names = [name.strip() for name in whole] if len(whole) in widths else names
     if len(names) > max(widths) and delimiter is None:
-        # Blanks within names, as in `Time [s]  Command [mm]`.
-        parted = [re.split(by, line.strip()) for by in (r'\s{2,}', r'\s+(?![\[(\s])')]
+        parted = [by.split(line.strip()) for by in (_BLANKS, _NO_BRACKET)]
         names = next((found for found in parted if max(widths) - len(found) in (0, 1)), names)
     while len(names) > max(widths) and not names[-1]:
         names = names[:-1]
     return names
+
+
+def _behind_index(line: str, rows: list[str], table: list[list[str]]) -> bool:
+    """Whether a printed table has an index without a name, and one name of two words.
+
+    These are as many words as entries, but the first begins behind the first entries.
+    """
+    ends = [_ends(row, entries) for row, entries in zip(rows, table, strict=True)]
+    first = len(line) - len(line.lstrip())
+    printed = all(some and some[0] <= first and some[1:] == ends[0][1:] for some in ends)
+    return printed and len(_BLANKS.split(line.strip())) == len(table[0]) - 1
 
 
 def _aligned(names: list[str], table: list[list[str]], rows: list[str], line: str) -> list[str]:
@@ -526,8 +546,10 @@ def _all_rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
 
 def is_remark(line: str, delimiter: str | None, width: int) -> bool:
     """Return whether a line is a comment, and no row of so many entries behind a `#`."""
-    comment = _COMMENT.match(line)
-    return comment is not None and len(fields_of(line[comment.end() :], delimiter)) < width
+    entries = fields_of(uncommented(line), delimiter)
+    # Of blanks a sentence has as many.
+    row = len(entries) >= width and sum(map(is_number, entries)) > 1
+    return _COMMENT.match(line) is not None and not row
 
 
 def _block(

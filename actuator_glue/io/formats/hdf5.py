@@ -177,7 +177,10 @@ class _Tree:
 
     def _note(self, dataset: Any, shown: str) -> None:
         label = shown.replace('/', '.').rpartition('.')[2]
-        if label in NOTES or (is_rate(label) and dataset.size == 1):
+        # Numbers called `hold` or `actuator` are the laboratory's own.
+        words = _is_text(dataset) or dataset.dtype.kind in 'SUO'
+        number = label == 'stiffness_N_per_m' or is_rate(label)
+        if (words and label in NOTES) or (number and dataset.size == 1):
             self.notes[label] = _text(dataset)
         if _is_text(dataset):
             self.texts[shown] = _text(dataset)
