@@ -347,7 +347,8 @@ def test_a_name_that_is_improbable_is_never_told_as_missing(
         (None, 'its parameters changed'),
         (
             Change('stiffness', 0.7, 1e-5),
-            'the stiffness of the specimen became 70 % of what it was',
+            'its parameters changed, as if the stiffness of the specimen had become 70 % of what '
+            'it was',
         ),
     ],
 )

@@ -38,9 +38,9 @@ class Change:
     error: float
 
     def sentence(self) -> str:
-        """Say what changed."""
+        """Say what changed; what had the same effect is not known."""
         of = 'the stiffness of the specimen' if self.name == STIFFNESS else self.name
-        return f'{of} became {100.0 * self.factor:.3g} % of what it was'
+        return f'as if {of} had become {100.0 * self.factor:.3g} % of what it was'
 
     def to_json(self) -> Json:
         """Return the JSON object of a change."""

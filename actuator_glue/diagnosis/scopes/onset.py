@@ -55,7 +55,7 @@ class Onset:
             f'the parameters of Eq. (2){" or of an effect" if self.before else ""} changed'
         )  # fmt: skip
         if self.change is not None:
-            what = f'{self.change.sentence()}, which explains the change alone,'
+            what += f', {self.change.sentence()} and nothing else,'
         before = f', beside {", ".join(self.before)},' if self.before else ''
         return (
             f'{what}{before} {self.time:.2f} s (95 % {self.lower:.2f} to {self.upper:.2f} s) into '

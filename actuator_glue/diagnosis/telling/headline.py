@@ -164,7 +164,7 @@ def _verdict(found: Told) -> str:
         source = found.onset.source
         when = f' since {found.onset.time:.1f} s of {names_of(found)[source]}'
         one = found.onset.change
-        changed = 'its parameters changed' if one is None else one.sentence()
+        changed = 'its parameters changed' + (f', {one.sentence()}' if one is not None else '')
         names += when if names else ''
         asked = names or f'a change{when}, where {changed}'
         enough += f'{when}, where {changed}'
