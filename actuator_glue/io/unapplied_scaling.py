@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.io.noted_rate import plain
+
 # Names of what numbers may have to be multiplied by, and of what may have to be added.
 _GAIN = re.compile(
     r'(?:(?:cal|calib|calibration|scal(?:e|ing)|conversion|channel)_?)?'
@@ -29,8 +31,8 @@ def scaling(attributes: Mapping[str, Any], applied: tuple[str, ...] = ()) -> str
     for name in attributes:
         if name in applied:
             continue
-        plain = re.sub(r'[\s-]+', '_', name.strip()).casefold()
-        neutral = 1.0 if _GAIN.fullmatch(plain) else 0.0 if _OFFSET.fullmatch(plain) else None
+        word = plain(name)
+        neutral = 1.0 if _GAIN.fullmatch(word) else 0.0 if _OFFSET.fullmatch(word) else None
         if neutral is None or np.size(attributes[name]) != 1:
             continue
         try:

@@ -158,7 +158,7 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     parts = [stretched(other) for other in others]
     ways = [(p, base_fit(p)) for p in parts]
     best = min(range(len(ways)), key=lambda i: ways[i][1].rms)
-    ahead = _ahead(some, given)
+    ahead = some, _ahead(some, given)
     part, found = min(ways[best], ahead, key=lambda way: way[1].rms)
     noise = pooled(part, splits_of(part, found.error))[1]
     material = settings.material(noise, stroke)
@@ -181,11 +181,11 @@ def _weight(found: Fit, material: float) -> float:
     return log_weight(found.rms, TELLING * material, len(found.theta))
 
 
-def _ahead(data: Data, given: Fit) -> tuple[Data, Fit]:
+def _ahead(data: Data, given: Fit) -> Fit:
     """Fit Eq. (2) with a displacement that runs ahead of its command."""
     effect = CATALOGUE[LEAD]
     starts = [(*given.theta, *sizes) for sizes in effect.starts(scale(data.records, given.theta))]
-    return data, fit(data, Structure((effect,)), np.array(starts))
+    return fit(data, Structure((effect,)), np.array(starts))
 
 
 def stretched(data: Data) -> Data:
