@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.api import judgement, tracking
+from actuator_glue.api import tracking
 from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.calibration_parts import FitError, Marginal
 from actuator_glue.api.ensemble import evenly, simulated
 from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.bands import band
+from actuator_glue.inference.convergence import APART
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -234,7 +235,7 @@ def next_command(found: CalibrationData) -> str:
     tests = [(s.source, s.stiffness_n_per_m) for s in found.sources]
     effects = [text for name in found.effects for text in ('--effect', name)]
     left = found.structure
-    apart = any(not p.rhat <= judgement.APART for p in found.parameters.values())
+    apart = any(not p.rhat <= APART for p in found.parameters.values())
     pressed = [p for p in found.at_bound if not p.physical]
     if apart:
         more = ['--evaluations', str(2 * found.evaluations)]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.api import judgement, tracking
+from actuator_glue.api import tracking
 from actuator_glue.api.calibration_report import (
     certainty,
     delays,
@@ -17,6 +17,7 @@ from actuator_glue.api.calibration_report import (
 )
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.inference.at_bound import pressed
+from actuator_glue.inference.convergence import APART
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import source_names
 from actuator_glue.report import html
@@ -113,7 +114,7 @@ def next_command(found: CombinationsData) -> str:
     """Return what to type next: with a stiffness, or of a free actuator."""
     tests = [(s.source, None) for s in found.sources]
     effects = [text for name in found.effects for text in ('--effect', name)]
-    if any(not p.rhat <= judgement.APART for p in found.combinations.values()):
+    if any(not p.rhat <= APART for p in found.combinations.values()):
         more = ['--evaluations', str(2 * found.evaluations)]
         return command('calibrate', tests, '--stiffness', 'unknown', *effects, *more)
     if found.pull is not None:

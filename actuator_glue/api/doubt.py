@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from actuator_glue.api.judgement import APART
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.verdict.rules import excused
 from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.hygiene.unlike_rest import unlike_rest
+from actuator_glue.inference.convergence import APART
 from actuator_glue.records import Record
 
 # Share of the held-out samples in the 95 % band below which that is no 95 % band: a noise that is

@@ -9,13 +9,12 @@ import numpy as np
 from actuator_glue.api.calibration_parts import FitError, Marginal
 from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.convergence import APART
 from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.records import Array, Record
 
 # R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
 CONVERGED = 1.01
-# R-hat above which chains have not met at all (the threshold of Gelman and Rubin 1992).
-APART = 1.2
 TIED = 0.99  # correlation above which two parameters are only known together
 MISFIT = 0.1  # share of a record's spread: a model that leaves more does not describe the test
 

@@ -17,6 +17,10 @@ from scipy.special import ndtri
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
+# R-hat above which chains have not met at all (the threshold of Gelman and Rubin 1992). Below it
+# intervals are about as wide as further draws would make them; above it they say nothing.
+APART = 1.2
+
 
 def rhat(draws: Array) -> Array:
     """Rank-normalised split R-hat of each parameter (Vehtari et al. 2021, Eqs. 3 and 14).

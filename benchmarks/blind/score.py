@@ -79,7 +79,8 @@ def _described(result: Json) -> bool:
     """Whether a learned term, and no wrong name, leaves next to noise on the held-out record."""
     d = result['diagnosis']
     near = d['error']['after'] <= _NEAR * result['clean_floor']
-    return bool(d.get('learned')) and not _named(result) and near
+    right = all(set(names) & set(result['effects']) for names in _named(result))
+    return bool(d.get('learned')) and right and near
 
 
 def _groups(names: list[str]) -> set[str]:

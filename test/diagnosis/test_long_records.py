@@ -65,6 +65,7 @@ def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
     for module in (posterior, advice):
         monkeypatch.setattr(module, 'RHAT', 0.9)
+        monkeypatch.setattr(module, 'APART', 0.9)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
 
     def larger(beam: BeamSearch, final: Trial, least: float | None = None) -> Trial:

@@ -23,6 +23,8 @@ PLACES = {
         'valve-deadband',
         'valve-null',
         'valve-hysteresis',
+        'valve-rate',
+        'valve-underlap',
         'integral-action',
     },
     'flow': {'flow-saturation', 'pressure-flow', 'flow-asymmetry', 'supply-droop', 'gain-drift'},

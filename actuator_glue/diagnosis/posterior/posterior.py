@@ -22,7 +22,7 @@ from actuator_glue.diagnosis.score.scorer import Scorer, inflation
 from actuator_glue.errors import InputError
 from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains
-from actuator_glue.inference.convergence import quick_rhat_and_ess
+from actuator_glue.inference.convergence import APART, quick_rhat_and_ess
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
@@ -61,7 +61,7 @@ class Draws(NamedTuple):
         effective: effective sample size, the least of all parameters.
         rhat: largest R-hat of chains, else not-a-number.
         pareto_k: shape of the tail of importance weights, else not-a-number.
-        unmet: per parameter, whether its chains have not converged; empty without chains.
+        unmet: per parameter, whether its chains are apart; empty without chains.
     """
 
     points: Array
@@ -109,13 +109,13 @@ def opened(
     """Spread draws as far as the records leave each parameter open.
 
     Evenly in the working coordinates: over the ridge where draws do not reach its ends, over the
-    bounds where chains disagree. Intervals are quantiles of what is returned.
+    bounds where chains are apart. Intervals are quantiles of what is returned.
 
     Args:
         space: working coordinates.
         draws: of all parameters (m, p), physical units.
         ridge: parameters that fit as well (n, p).
-        unmet: per parameter, whether its chains have not converged; empty for none.
+        unmet: per parameter, whether its chains are apart; empty for none.
         rng: random numbers.
 
     Returns:
@@ -275,5 +275,5 @@ def sample(
         chains.evaluations,
         effective=float(chains.ess.min()),
         rhat=float(chains.rhat.max()),
-        unmet=tuple(bool(r > RHAT) for r in chains.rhat),
+        unmet=tuple(bool(r > APART) for r in chains.rhat),
     )

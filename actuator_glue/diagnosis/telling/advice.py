@@ -19,6 +19,7 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.rules import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.convergence import APART
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 
@@ -177,6 +178,11 @@ def unconverged(rhat: float) -> tuple[str, ...]:
     """Warn where the chains of the posterior have not converged; NaN gives no warning."""
     if not rhat > RHAT:
         return ()
+    if rhat <= APART:
+        return (
+            f'the chains of the posterior have nearly met (R-hat {rhat:.2f}): intervals may be '
+            f'{100.0 * (rhat - 1.0):.0f} % too narrow or too wide',
+        )
     return (
         f'the chains of the posterior have not met (R-hat {rhat:.2f}): sizes that they differ '
         'about are told as not identified, and names of effects that may then be nothing have a '

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +22,6 @@ from actuator_glue.records import Array, Hold, Record
 
 # Sub-steps are at most this long: the error of one effect stays below 0.3 um on a 2 mm sweep.
 MAX_STEP = 1.05e-3  # s
-# A straight line through the step cuts off the point at which the error turns, under a held
-# command in every sample: of 10 um by a valve's play at 1 kHz it lost 0.17 um; in steps half as
-# long 0.04, a quarter 0.01.
-_TURNING: Final = 2
 # ... and short against the fastest pole of Eq. (2), up to eight times shorter than MAX_STEP.
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
@@ -46,7 +41,7 @@ def sample_steps(period: float, times: int = 1) -> int:
 
 def turning(program: Program, hold: Hold) -> int:
     """Return how many times shorter sub-steps are where a valve's error turns within them."""
-    return _TURNING if program.turns and hold == 'zoh' else 1
+    return program.shorter if hold == 'zoh' else 1
 
 
 def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Array:

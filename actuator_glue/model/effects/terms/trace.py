@@ -33,7 +33,8 @@ def sine(scale: Scale, time: Array, period: float) -> dict[str, Array]:
     turn = 2.0 * np.pi / period
     x = scale.stroke * np.sin(turn * time)
     v = scale.stroke * turn * np.cos(turn * time)
-    error = beta_1 * oil * v / into
+    # The spool has to be turned as well: dq/dt = alpha_1 beta_0 e - beta_1 q, without leakage.
+    error = oil * (beta_1 * v - turn**2 * x) / into
     return {
         # A term of time may take the whole test to act, in which such a sine turns many times.
         't': scale.duration / time[-1] * time,
