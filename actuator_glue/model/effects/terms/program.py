@@ -46,7 +46,7 @@ _SIGNALS: Final[dict[str, Dual]] = {
 # A straight line through the step cuts off the point at which the error turns, under a held
 # command in every sample: of 10 um by a valve's play at 1 kHz it lost 0.17 um; in steps half as
 # long 0.04, a quarter 0.01. Where the flow bounds the error, so that it bends within the step, it
-# lost 9 um of 500 um; in steps a quarter as long 1.6.
+# lost 9 um of 500 um; in steps a quarter as long 0.1.
 _TURNING: Final = 2
 _BENDS: Final = ('clip', 'min', 'max', 'dead', 'abs', 'sign')
 _BENDING: Final = 4
