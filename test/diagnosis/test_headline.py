@@ -307,6 +307,8 @@ def test_what_likely_parameters_leave_bears_additions_out(
             'likely as the best (80.0 -> 90.0 um with the best: the fitting records leave them '
             'open), noise 10.0 um; 12.0 um of structure in the fitting records remain'
         )
+        explained = replace(told, remaining={**told.remaining, 'left': 4e-8})
+        assert explained.summary().endswith('leave them open), noise 10.0 um')
 
 
 @pytest.mark.parametrize(

@@ -173,8 +173,10 @@ def _verdict(found: Told) -> str:
         asked = f'for {asked}, the held-out part does not' if asked else 'for nothing'
         return f'undecided: the fitting records ask {asked}; {change}'
     if found.verdict == 'unexplained':
-        rest = f'{1e6 * found.remaining["left"]:.1f} um of structure in the fitting records remain'
+        left = f'{1e6 * found.remaining["left"]:.1f}'
+        if float(left) > 0.0:  # else it is the held-out part alone that shows more
+            change += f'; {left} um of structure in the fitting records remain'
         if not names:
-            return f'the model is not enough and no addition is supported: {change}; {rest}'
-        return f'added, but not the whole story: {names}; {change}; {rest}'
+            return f'the model is not enough and no addition is supported: {change}'
+        return f'added, but not the whole story: {names}; {change}'
     return f'missing: {names}; {change}' if names else f'{enough}: {change}'
