@@ -35,6 +35,7 @@ PLACES = {
         'specimen-gap',
         'specimen-hardening',
         'specimen-yield',
+        'specimen-relaxation',
         'frame-mode',
     },
     'sensor': {

@@ -103,7 +103,7 @@ def test_neutral_is_eq_2_although_the_expression_has_no_value_there() -> None:
         ('valve: e = sinh(e)', "no function 'sinh'"),
         ('valve: e = min(e)', 'min takes 2'),
         ('valve: e = lag(e, x)', 'second argument of lag'),
-        ('force: f = f + lag(x, own)', 'lag remembers'),
+        ('force: f = f + rate(x, own)', 'rate remembers'),
         ('valve: e = e + own*rate(e)', 'rate takes 2'),
         ('command: u = u + own*lowpass(u, 5, x)', 'third argument of lowpass'),
         ('command: u = u + own*bandpass(u, 5, 1.2)', 'below 1, not 1.2'),

@@ -1,4 +1,4 @@
-"""Forces that remember: friction that holds as a spring until it slips."""
+"""Forces that remember: friction that holds as a spring until it slips, a damper on a spring."""
 
 import numpy as np
 import pytest
@@ -118,8 +118,43 @@ def test_blocks_are_the_whole(rng_seed: int) -> None:
     assert np.abs(rest).max() == pytest.approx(FORCE, rel=0.02)
 
 
-@pytest.mark.parametrize('name', ['lag(x, a)', 'integral(x)', 'limit_rate(x, a)'])
+@pytest.mark.parametrize('name', ['integral(x)', 'limit_rate(x, a)'])
 def test_other_memory_is_refused(name: str) -> None:
     """It says where such a function can act."""
     with pytest.raises(InputError, match=r'column 18: .* it can act at command, valve, flow only'):
         read(f'force: f = f + a*{name}', ('a',))
+
+
+def relaxing(record: Record, more: float, time: float, steps: int) -> Array:
+    """Displacement by Heun's rule: a spring beside the specimen, held by a dashpot."""
+    beta_1, into, alpha_2, alpha_3 = THETA
+    k, h = record.known_stiffness(), record.period / steps
+    x = q = held = 0.0
+    out = np.zeros(len(record))
+
+    def slopes(x: float, q: float, held: float, u: float) -> tuple[float, float, float]:
+        # d(held)/dt = more k v - held/time; alpha_2 v + df/dt = q - alpha_3 f.
+        v = (q - alpha_3 * (k * x + held) + held / time) / (alpha_2 + k * (1.0 + more))
+        return v, into * (u - x) - beta_1 * q, more * k * v - held / time
+
+    for i in range(1, len(record)):
+        for j in range(steps):
+            u = np.interp([j / steps, (j + 1) / steps], [0, 1], record.command[i - 1 : i + 1])
+            a = slopes(x, q, held, u[0])
+            b = slopes(x + h * a[0], q + h * a[1], held + h * a[2], u[1])
+            x, q, held = (
+                value + 0.5 * h * (first + last)
+                for value, first, last in zip((x, q, held), a, b, strict=True)
+            )
+        out[i] = x
+    return out
+
+
+@pytest.mark.parametrize(('more', 'time'), [(0.5, 0.02), (1.0, 0.2)])
+def test_a_specimen_that_relaxes(more: float, time: float) -> None:
+    """Below 0.1 um rms of what it does."""
+    record = sweeping(2e6)
+    found = moved(record, Structure(('specimen-relaxation',)), more, time)
+    expected = relaxing(record, more, time, 20)
+    assert 1e6 * np.std(found - moved(record, Structure(()))) > 20.0
+    assert 1e6 * np.std(found - expected) < 0.1

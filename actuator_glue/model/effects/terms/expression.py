@@ -50,7 +50,7 @@ FUNCTIONS: Final = dict.fromkeys(
 MEMORY: Final = {'lag': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
 REMEMBERING: Final = ('command', 'valve', 'flow')
 FORCES: Final = ('specimen', 'piston')
-_OF_FORCES: Final = ('play',)
+_OF_FORCES: Final = ('play', 'lag')
 _REMEMBER: Final = MEMORY | {name: count for name, (count, _) in FILTERS.items()}
 _LONGEST: Final = 2000
 # Each has its argument five times: one of another, and so on, would fill the memory.

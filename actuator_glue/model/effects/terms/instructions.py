@@ -218,13 +218,15 @@ class Emitter:
     def _remembered(self, name: str, operand: Tree, *sizes: Tree) -> Dual:
         """What remembers, and its slope; along `changes` its own change, and it does not jump."""
         a, da = self.emit(operand)
-        if self.at_end:  # of these only play is, see expression.py
+        if self.at_end and name == 'play':
             return self._dragged(a, da, self.emit(sizes[0])[0])
         one, b = self.constant(1.0), m.STEP
         if name == 'lag':
             steps = self.do(m.DIV, m.STEP, self.emit(sizes[0])[0])
             b = self.do(m.EXP, self.do(m.NEG, steps))
             mean = self.do(m.DIV, self.do(m.SUB, one, b), steps)
+            if self.at_end:
+                return self._relaxed(a, da, b, mean)
             out = self.do(m.LAG, a, b, mean, self._keep(m.LAG, a, b))
             moved, gain = out + 1, self.do(m.SUB, one, mean)
         elif name == 'integral':
@@ -248,6 +250,23 @@ class Emitter:
         out, slope = self._chosen('max', self._chosen('min', before, (above, da)), (below, da))
         self.ends[kept] = out
         return out, slope
+
+    def _relaxed(self, a: int, da: int | None, left: int, mean: int) -> Dual:
+        """Lag at the step's end of what runs straight in it; kept once the step is known.
+
+        Args:
+            a: the signal at the end.
+            da: its slope.
+            left: share of the lag that the step leaves.
+            mean: mean of that share over the step.
+        """
+        signal, lagged = self._keep(m.RECALL, a), self._keep(m.LAG, a, left)
+        follows = self.do(m.SUB, self.constant(1.0), mean)
+        old = self.do(m.MUL, left, self.do(m.RECALL, lagged, a))
+        begun = self.do(m.MUL, self.do(m.SUB, mean, left), self.do(m.RECALL, signal, a))
+        out = self.do(m.ADD, self.do(m.ADD, old, begun), self.do(m.MUL, follows, a))
+        self.ends[signal], self.ends[lagged] = a, out
+        return out, self._times(follows, da)
 
     def _turning(
         self, plays: bool, a: int, b: int, change: int | None, jump: int | None
