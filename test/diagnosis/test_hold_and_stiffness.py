@@ -78,6 +78,13 @@ def test_a_command_that_ran_linearly_is_begun_with() -> None:
     assert {row.scope for row in found.structures} == {LINEAR}
 
 
+def test_a_lead_of_about_half_a_sample_is_the_other_hold() -> None:
+    """A transducer's lag too small to matter made it a lead, which has a size to fit it with."""
+    records = machine(0.0, 250e3, hold='linear', effect='sensor-lag', size=3e-4)
+    other = find(prepare([replace(r, hold='zoh') for r in records], []).fit, Thresholds())
+    assert other is not None and other.runs_linearly and other.enough
+
+
 def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> None:
     """Play under held commands, begun with linear ones."""
     settings, ready = Thresholds(), prepare(machine(0.0, 250e3, effect='backlash'), [])

@@ -17,7 +17,7 @@ import numpy as np
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import log_weight
-from actuator_glue.diagnosis.thresholds import SETUP_FAR, TELLING, Thresholds
+from actuator_glue.diagnosis.thresholds import MATTERING, SETUP_FAR, Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
 from actuator_glue.inference.least_squares.stretches import stretches
@@ -162,6 +162,7 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     part, found = min(ways[best], ahead, key=lambda way: way[1].rms)
     noise = pooled(part, splits_of(part, found.error))[1]
     material = settings.material(noise, stroke)
+    # A lead of half a sample is the other hold: what it is beyond that must matter.
     leads = _weight(ahead[1], material) > _weight(ways[best][1], material)
     part, found = ahead if leads else ways[best]
     if given.rms**2 - found.rms**2 < max(material**2, (SETUP_FAR - 1.0) * found.rms**2):
@@ -178,7 +179,7 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
 
 
 def _weight(found: Fit, material: float) -> float:
-    return log_weight(found.rms, TELLING * material, len(found.theta))
+    return log_weight(found.rms, MATTERING * material, len(found.theta))
 
 
 def _ahead(data: Data, given: Fit) -> Fit:
