@@ -57,10 +57,14 @@ def command(rng: np.random.Generator, rate: float, duration: float, last: float)
     return np.asarray(u / np.abs(u).max())
 
 
-def build(seed: int) -> Case:
+def build(seed: int, effect: str = '') -> Case:
     """Build one case from its seed: every third machine is healthy, the others have one effect.
 
     Its size is the typical one of the catalogue for the test; it may be below the noise.
+
+    Args:
+        seed: of all that is drawn.
+        effect: in place of the one that is drawn, which depends on what the catalogue holds.
     """
     rng = np.random.default_rng([seed, 17])
     rate = float(rng.choice(RATES))
@@ -74,7 +78,8 @@ def build(seed: int) -> Case:
     duration = min(200.0, float(rng.choice(DURATIONS)) * max(1.0, 2.0 / last))
     stiffness = tuple(stiff * float(k) for k in rng.choice(SHARES, 3))
     known = [n for n in CATALOGUE.searched() if CATALOGUE[n].variance is None and n != 'hum']
-    names = () if seed % 3 == 0 else (str(rng.choice(known)),)
+    drawn = str(rng.choice(known)) if seed % 3 else ''
+    names = tuple(filter(None, (effect or drawn,)))
     inputs = [amplitude * command(rng, rate, duration, last) for _ in stiffness]
     still = [Record(u, u, 1.0 / rate, k) for u, k in zip(inputs, stiffness, strict=True)]
 

@@ -130,7 +130,7 @@ def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
 def test_a_lead_is_held_against_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """A gain that drifts: a lead alone explains most of it, and noise hides the rest."""
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / 'benchmarks' / 'blind'))
-    case = import_module('far').build(99043)
+    case = import_module('far').build(99043, effect='gain-drift')
     rows = zip(case.commands, case.measured, case.stiffness, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k) for u, y, k in rows]
     other = find(prepare(records[:2], []).fit, Thresholds())
