@@ -186,7 +186,7 @@ class DiagnoserNode(WorkingNode):
         values = self.parameters.values()
         records, known = looked_at(self.collector, self.memory, wanted.since)
         if not records:
-            self._take(live.Concluded())
+            self._take(live.GivenUp())
             return
         seconds = sum(record.duration for record in records)
         self.get_logger().info(f'diagnosing {seconds:.0f} s: {wanted.reason}')
@@ -256,7 +256,7 @@ class DiagnoserNode(WorkingNode):
         self._explained.diagnosis(outcome.diagnosis.to_json())
         self.get_logger().info(outcome.message)
         self._request, self._told = None, outcome
-        if outcome.remembered is not None:
+        if self.loop.diagnosing == 'the stream':
             self._remembered = outcome.remembered
         self._take(outcome.concluded)
         if self._swap is None:
@@ -299,7 +299,7 @@ class DiagnoserNode(WorkingNode):
         self._request = None
         self._finish(outcome)
         if self.active:
-            self._take(live.Concluded())
+            self._take(live.GivenUp())
 
     def _finish(self, outcome: diagnoser_worker.Outcome) -> None:
         self._swap = None

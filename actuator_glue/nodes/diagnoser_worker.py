@@ -89,7 +89,7 @@ class Outcome:
     applied: bool = False
     concluded: Concluded = field(default_factory=Concluded)
     reason: str = ''
-    remembered: Remembered | None = None
+    remembered: Remembered = field(default_factory=Remembered)
 
 
 def asked(goal: Any, live: tuple[Record, ...], unused: str = '') -> Request:
@@ -144,7 +144,7 @@ def work(request: Request, tell: Tell) -> Outcome:
         actuator=records[0].actuator,
         concluded=concluded(found, records, request.apply),
         reason=request.reason,
-        remembered=None if request.paths else request.remembered,
+        remembered=request.remembered,
     )
 
 

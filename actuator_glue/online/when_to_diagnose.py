@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from scipy.special import ndtri
@@ -34,6 +34,7 @@ _LASTING, _LEVEL = 4, 0.95
 _OFF = 1.5
 # Data of the changed machine to wait for before a diagnosis, if bands were good until now [s].
 _CHANGED = 5.0
+_GOES_ON = 'the estimator goes on as it is'
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +134,13 @@ class Requested:
 
 
 @dataclass(frozen=True, slots=True)
+class GivenUp:
+    """A diagnosis has ended without a result."""
+
+
+@dataclass(frozen=True, slots=True)
 class Concluded:
-    """A diagnosis of the stream has ended.
+    """A diagnosis has a result.
 
     Attributes:
         proposal: what the estimator should carry; None where it should go on as it is.
@@ -152,7 +158,11 @@ class Concluded:
     supported: frozenset[str] | None = None
 
 
-Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Requested | Concluded
+Input: TypeAlias = (
+    Received | Judged | Carries | Estimated | Began | Requested | GivenUp | Concluded
+)
+# What is diagnosed now, if anything.
+Diagnosing: TypeAlias = Literal['', 'the stream', 'other records', 'another actuator']
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +219,7 @@ class LiveState:
         since: first window with the structures carried now.
         weights: structures that are carried, the likeliest first.
         reason: why a diagnosis is due; empty for none.
-        running: a diagnosis is under way.
+        diagnosing: what the diagnosis is of that is under way; empty without one.
         looked: data received when the last diagnosis began [s]; NaN before the first.
         left_open: the last diagnosis left names tied, or structure in the residual.
         sound: bands of the structures carried now have been good.
@@ -228,7 +238,7 @@ class LiveState:
     since: int = 0
     weights: tuple[tuple[frozenset[str], float], ...] = ()
     reason: str = ''
-    running: bool = False
+    diagnosing: Diagnosing = ''
     looked: float = math.nan
     left_open: bool = False
     sound: bool = False
@@ -292,15 +302,18 @@ def step(state: LiveState, given: Input) -> tuple[LiveState, tuple[Action, ...]]
         case Began():
             state = _began(state)
         case Requested():
-            looked = state.seconds if given.streamed else state.looked
-            return replace(state, running=True, looked=looked), ()
+            if not given.streamed:
+                return replace(state, diagnosing='other records'), ()
+            return replace(state, diagnosing='the stream', looked=state.seconds), ()
+        case GivenUp():
+            state = replace(state, diagnosing='')
         case Concluded():
             state, told = _concluded(state, given)
     state = _timed(state)
     reason = _due(state)
     if not reason:
         return state, told
-    state = replace(state, running=True, looked=state.seconds, reason='')
+    state = replace(state, diagnosing='the stream', looked=state.seconds, reason='')
     return state, (*told, Look(reason, state.origin))
 
 
@@ -374,8 +387,8 @@ def _received(state: LiveState, seconds: float) -> LiveState:
     """Take the amount of data received; less than before means another actuator."""
     if seconds >= state.seconds:
         return replace(state, seconds=seconds)
-    fresh = LiveState(state.settings, running=state.running)
-    return replace(fresh, seconds=seconds)
+    goes_on = 'another actuator' if state.diagnosing == 'the stream' else state.diagnosing
+    return LiveState(state.settings, seconds, diagnosing=goes_on)
 
 
 def _began(state: LiveState) -> LiveState:
@@ -393,18 +406,22 @@ def _timed(state: LiveState) -> LiveState:
 
 
 def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Action, ...]]:
-    # An alarm raised meanwhile is of samples mostly diagnosed, or of structures replaced now.
-    state = replace(state, running=False, left_open=given.left_open, reason='')
+    of, state = state.diagnosing, replace(state, diagnosing='')
+    if of == 'the stream':
+        # An alarm raised meanwhile is of samples mostly diagnosed, or of structures replaced now.
+        state = replace(state, left_open=given.left_open, reason='')
     apply = state.settings.apply if given.apply is None else given.apply
     if not apply:
         return state, ()
+    if of == 'another actuator':
+        return state, (Say('diagnosis', f'{_GOES_ON}: the samples are of another actuator now'),)
     leading, weight = state.weights[0] if state.weights else (frozenset(), 1.0)
     if given.proposal is None:
         doubted = () if given.supported is None else tuple(sorted(leading - given.supported))
         if doubted:
             doubt = Say('in doubt', f'{", ".join(doubted)}: {given.why_not}')
             return _began(state), (doubt, Carry(_evenly(leading)))
-        said = (Say('diagnosis', f'the estimator goes on as it is: {given.why_not}'),)
+        said = (Say('diagnosis', f'{_GOES_ON}: {given.why_not}'),)
         return state, said if given.why_not else ()
     wanted = frozenset(given.proposal.structures[0].model.effects)
     out = tuple(sorted(leading - wanted))
@@ -448,7 +465,7 @@ def _without(effects: frozenset[str], fewer: Proposal) -> Proposal:
 def _due(state: LiveState) -> str:
     """Return why a diagnosis is due; empty where none is."""
     settings, seconds = state.settings, state.seconds
-    if state.running or not settings.automatic or seconds < settings.minimum:
+    if state.diagnosing or not settings.automatic or seconds < settings.minimum:
         return ''
     paused = seconds < state.looked + settings.pause
     if state.reason and not paused and seconds >= state.ready:
@@ -462,6 +479,6 @@ def _due(state: LiveState) -> str:
             return 'there are twice as many data as what was added was found in'
     # NaN without an alarm: there is nothing to diagnose again.
     again = max(state.alarm, state.looked) + max(settings.pause, state.looked - state.alarm)
-    if seconds >= max(again, state.ready):
+    if seconds >= max(again, state.ready) and seconds != state.looked:
         return 'the alarm still stands, and there are more data since it began'
     return ''

@@ -43,7 +43,7 @@ def carries(actions):
 def broken(seconds=30.0):
     """A loop whose first diagnosis runs, because coverage broke."""
     state, actions = run(live.init(SETTINGS), live.Received(seconds), *[live.Judged(0.5)] * 3)
-    assert len(looks(actions)) == 1 and state.running
+    assert len(looks(actions)) == 1 and state.diagnosing == 'the stream'
     return state
 
 
@@ -84,7 +84,8 @@ def test_it_looks_again_at_twice_the_data_while_something_is_open():
             asked.append(seconds)
             state, _ = run(state, live.Concluded(proposal('backlash'), left_open=True))
     assert asked == [40, 80, 160]
-    state, actions = run(state, live.Concluded(proposal('backlash')), live.Received(1e4))
+    settled = live.Concluded(proposal('backlash'))
+    state, actions = run(state, live.Requested(), settled, live.Received(1e4))
     assert looks(actions) == []
 
 
@@ -98,6 +99,48 @@ def test_what_was_added_is_looked_at_again_in_twice_the_data():
     assert looks(actions) == ['there are twice as many data as what was added was found in']
     state, actions = run(state, live.Concluded(proposal('backlash', 'gain-drift')))
     assert carries(actions) == [('backlash', 'gain-drift')]
+
+
+@pytest.mark.parametrize('apply', [None, True])
+def test_what_was_found_of_an_actuator_is_carried_for_no_other(apply):
+    state, _ = run(broken(60.0), live.Received(0.5))
+    found = live.Concluded(proposal('backlash'), left_open=True, apply=apply)
+    state, actions = run(state, found)
+    assert [action.kind for action in actions] == ['diagnosis']
+    # Nor do names that are tied there have this one looked at.
+    state, actions = run(state, live.Received(500.0))
+    assert actions == []
+    # What was found of this one is carried.
+    _, actions = run(state, live.Requested(), found)
+    assert carries(actions) == [('backlash',)]
+
+
+def test_other_records_and_what_is_given_up_say_nothing_of_the_stream():
+    state, _ = run(broken(20.0), live.Concluded(proposal('backlash'), left_open=True))
+    others = live.Requested(streamed=False)
+    own_setting = live.Concluded(None, 'it has a setting of its own')
+    for begin, end in ((others, own_setting), (live.Requested(), live.GivenUp())):
+        _, actions = run(state, begin, end, live.Received(40.0))
+        assert looks(actions)[0].startswith('names are tied')
+    # An alarm that was raised meanwhile is looked into for its own reason.
+    quiet, _ = run(live.init(SETTINGS), live.Received(30.0), live.Judged(0.9))
+    for end in (live.Concluded(proposal(), left_open=True), live.GivenUp()):
+        _, actions = run(quiet, others, *[live.Judged(0.1)] * 5, end, live.Received(40.0))
+        assert [reason.partition(' covers')[0] for reason in looks(actions)] == [
+            'the band of parameters and sensor noise'
+        ]
+    # And a diagnosis of them is carried where that was asked for.
+    assert carries(run(quiet, others, live.Concluded(proposal('backlash'), apply=True))[1])
+
+
+def test_a_look_without_records_waits_for_more_data():
+    """Without a pause, gaps had it look for ever at the same moment."""
+    settings = replace(SETTINGS, pause=0.0)
+    state, actions = run(live.init(settings), live.Received(30.0), *[live.Judged(0.5)] * 3)
+    assert len(looks(actions)) == 1
+    state, actions = run(state, live.GivenUp(), live.Received(30.0))
+    assert looks(actions) == []
+    assert len(looks(run(state, live.Received(30.5))[1])) == 1
 
 
 def test_a_contradicted_prior_is_looked_into_and_once():
