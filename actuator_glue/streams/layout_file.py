@@ -106,6 +106,15 @@ def _check(made: Layout, where: str) -> None:
     for name in NEEDED:
         if name not in [f.name for f in made.sample]:
             raise InputError(f'{where}: sample has no field called {name}')
+    channels: dict[str | int, list[str]] = {}
+    place = 1
+    for field in made.sample:
+        if field.name in (*NEEDED, 'force'):
+            channels.setdefault(field.column or place, []).append(field.name)
+        place += field.count
+    for column, same in channels.items():
+        if len(same) > 1:
+            raise InputError(f'{where}: {" and ".join(same)} are both column {column}')
     check_motion(made.motion, made.stiffness, where)
     if any(f.name in (*NEEDED, 'force') for f in made.packet):
         raise InputError(f'{where}: packet holds counter, time and what is stepped over only')

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from decimal import Decimal, InvalidOperation
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
-from actuator_glue.streams.layout import Layout
+from actuator_glue.streams.layout import Field, Layout
 
 LONGEST = 8192  # bytes of a line; one without end is no line
 
@@ -24,7 +25,7 @@ def places(layout: Layout, names: Sequence[str] | None) -> dict[str, int]:
         names: names of the columns, where they are known.
 
     Raises:
-        LookupError: a named column is not there.
+        LookupError: a named column is not there, or there twice.
     """
     found: dict[str, int] = {}
     place = 0
@@ -34,12 +35,30 @@ def places(layout: Layout, names: Sequence[str] | None) -> dict[str, int]:
         if not field.role:
             continue
         if isinstance(at, str):
-            if names is None or at not in names:
-                raise LookupError(at)
-            found[field.name] = list(names).index(at)
+            held = [i for i, name in enumerate(names or ()) if name == at]
+            if len(held) != 1:
+                raise LookupError(f'column {at} is {"there twice" if held else "not in it"}')
+            found[field.name] = held[0]
         else:
             found[field.name] = at if field.column is None else at - 1
     return found
+
+
+def sent_columns(layout: Layout) -> list[Field]:
+    """Return the field in each column that is sent, so that `places` finds all of them."""
+    listed = [field for field in layout.sample for _ in range(field.count)]
+    at = {i: field for i, field in enumerate(listed) if field.column is None}
+    at |= {f.column - 1: f for f in layout.sample if isinstance(f.column, int)}
+    free = (i for i in count() if i not in at)
+    for field in listed:
+        if isinstance(field.column, str):
+            at[next(free)] = field
+    return [at.get(i, Field('unused')) for i in range(max(at) + 1)]
+
+
+def label(field: Field) -> str:
+    """Return the name of the column of a field that is sent."""
+    return field.column if isinstance(field.column, str) else field.name
 
 
 class Lines:
@@ -49,6 +68,7 @@ class Lines:
         layout: what a line holds.
 
     Attributes:
+        by_name: a column is found by its name: the first line has to name them.
         odd: what the last line that cannot be read is, and what was expected; empty without one.
 
     Raises:
@@ -62,6 +82,7 @@ class Lines:
                 'samples, or receive datagrams (udp://)'
             )
         self._layout = layout
+        self.by_name = any(isinstance(field.column, str) for field in layout.sample if field.role)
         self.odd = ''
         self.begin()
 
@@ -88,27 +109,38 @@ class Lines:
         rows: list[list[float]] = []
         for line in lines:
             entries = self._entries(line)
+            why = ''
             if self._places is None:
-                names = [entry.strip(' "') for entry in entries]
+                why = self._take_names(entries)
+            else:
                 try:
-                    self._places, self._width = places(self._layout, names), len(names)
-                except LookupError as error:
-                    bad += 1
-                    self._tell(line, f'column {error} is not in it')
-                continue
-            try:
-                if len(entries) != (self._width or len(entries)):
-                    raise ValueError(f'{len(entries)} entries in place of {self._width}')
-                row = [_number(entries[at], name) for name, at in self._places.items()]
-            except (ValueError, IndexError) as error:
+                    rows.append(self._row(entries, self._places))
+                except (ValueError, IndexError) as error:
+                    # The columns may be named once more, in another order.
+                    if not self.by_name or self._take_names(entries):
+                        why = str(error)
+            if why:
                 bad += 1
-                self._tell(line, str(error))
-                continue
-            self._width = len(entries)
-            rows.append(row)
+                self._tell(line, why)
         table = np.array(rows, dtype=np.float64).reshape(len(rows), len(self._layout.fields))
         fields = self._places or self._layout.fields
         return dict(zip(fields, table.T, strict=False)), bad
+
+    def _take_names(self, entries: Sequence[str]) -> str:
+        """Take the names of the columns; return why that cannot be, empty where it can."""
+        names = [entry.strip(' "') for entry in entries]
+        try:
+            self._places, self._width = places(self._layout, names), len(names)
+        except LookupError as error:
+            return str(error)
+        return ''
+
+    def _row(self, entries: Sequence[str], at: Mapping[str, int]) -> list[float]:
+        if len(entries) != (self._width or len(entries)):
+            raise ValueError(f'{len(entries)} entries in place of {self._width}')
+        row = [_number(entries[place], name) for name, place in at.items()]
+        self._width = len(entries)
+        return row
 
     def _tell(self, line: bytes, why: str) -> None:
         shown = line[:60].decode('utf-8', 'replace').strip()
@@ -117,30 +149,27 @@ class Lines:
     def _entries(self, line: bytes) -> list[str]:
         """Return the entries of a line; an empty one behind the last delimiter is none."""
         delimiter = self._layout.delimiter
-        text = line.decode('utf-8', 'replace').rstrip('\r')
+        text = line.decode('utf-8-sig', 'replace').rstrip('\r')
         entries = text.split() if delimiter == ' ' else text.split(delimiter)
         return entries[:-1] if len(entries) > 1 and not entries[-1].strip() else entries
 
     def encoded(self, values: Mapping[str, Array]) -> list[bytes]:
         """Return one line per sample, without its end; fields in the layout's order."""
-        delimiter = self._layout.delimiter
         columns: list[list[str]] = []
         size = len(values['command'])
-        for field in self._layout.sample:
-            if field.name == 'counter':
+        for field in sent_columns(self._layout):
+            if not field.role:
+                columns.append(['0'] * size)
+            elif field.name == 'counter':
                 columns.append([str(int(v)) for v in values['counter']])
-            elif field.role:
-                columns.append([repr(float(v)) for v in field.sent(values[field.name])])
             else:
-                columns += [['0'] * size] * field.count
+                columns.append([repr(float(v)) for v in field.sent(values[field.name])])
+        delimiter = self._layout.delimiter
         return [delimiter.join(row).encode() for row in zip(*columns, strict=True)]
 
     def head(self) -> bytes:
         """Return the line that names the columns."""
-        names = []
-        for field in self._layout.sample:
-            name = field.column if isinstance(field.column, str) else field.name
-            names += [name] * field.count
+        names = [label(field) for field in sent_columns(self._layout)]
         return self._layout.delimiter.join(names).encode()
 
 

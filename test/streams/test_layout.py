@@ -71,6 +71,14 @@ def test_what_is_no_shipped_layout_is_said_with_those_that_are(name, tmp_path, m
         ({'sample': [{'name': 'x', 'count': 10_001}, *BOTH]}, 'at least 1'),
         ({'sample': BOTH, 'stiffness': -1}, 'stiffness'),
         ({'sample': [{'name': 'command', 'unit': 'deg'}, BOTH[1]]}, 'command has unit .deg.'),
+        (
+            {'sample': [{**BOTH[0], 'column': 'x'}, {**BOTH[1], 'column': 'x'}]},
+            'command and measured are both column x',
+        ),
+        (
+            {'sample': [{**BOTH[0], 'column': 2}, BOTH[1]]},
+            'command and measured are both column 2',
+        ),
         ({'sample': TURNING, 'stiffness': 1e5}, 'the motion is in deg: give 0'),
     ],
 )
@@ -158,6 +166,10 @@ def test_a_counter_that_is_no_number_is_left_out_and_told():
     assert np.allclose(rows.command, [1e-3, 5e-3])
 
 
+NUMBERED = [{**BOTH[0], 'column': 2}, {**BOTH[1], 'column': 4}]
+NAMED = [{**BOTH[0], 'column': 'u'}, {**BOTH[1], 'column': 'x'}]
+
+
 def test_lines_by_place_and_by_name():
     by_place = Lines(layout(BOTH, delimiter=';'))
     values, bad = by_place.decoded([b'1.5;2.5\r', b'x;y', b'3', b'4;5;', b'\xff;1', b'1_0;2'])
@@ -168,6 +180,50 @@ def test_lines_by_place_and_by_name():
     assert not bad and values['command'].tolist() == [3.0] and values['measured'].tolist() == [1.0]
     by_name.begin()
     assert by_name.decoded([b'a,b,c', b'1,2,3'])[1] == 2
+
+
+@pytest.mark.parametrize('names', [b'x,t,u', b'\xef\xbb\xbfx,t,u', b'"x", "t", "u"'])
+def test_columns_that_are_named_anew_have_their_new_order(names):
+    """A program that is started again behind a relay: the connection stays, columns may differ."""
+    lines = Lines(layout(NAMED, header=True))
+    values, bad = lines.decoded([names, b'1,2,3', b'u,x', b'3,1', b'u,x', b'u,t', b'3,1'])
+    assert values['command'].tolist() == [3.0] * 3 and values['measured'].tolist() == [1.0] * 3
+    assert bad == 1 and 'u,t' in lines.odd
+    assert lines.decoded([b'u,x,1', b'3,1'])[1] == 1
+
+
+def test_a_name_of_two_columns_is_told():
+    lines = Lines(layout(NAMED, header=True))
+    assert lines.decoded([b'x,u,x'])[1] == 1 and 'column x is there twice' in lines.odd
+    # Of those that nobody asks for any may be there twice.
+    values, bad = lines.decoded([b'x,,u,,', b'1,0,2,0,'])
+    assert not bad and values['command'].tolist() == [2.0]
+
+
+@pytest.mark.parametrize(
+    ('one', 'two', 'more'),
+    [
+        (2, 1, []),
+        (4, 2, []),
+        ('u', 'x', []),
+        ('u', 1, []),
+        (3, 'x', [{'name': 'spare', 'count': 3}]),
+        ('u', None, [{'name': 'spare', 'count': 2}]),
+        (None, 7, []),
+        (None, None, [{'name': 'spare', 'count': 2}]),
+    ],
+)
+def test_what_is_sent_is_found_in_its_column(one, two, more):
+    """Columns went by the order of the layout: read by it, command and measured were exchanged."""
+    its = [{**BOTH[0], 'column': one}, *more, {**BOTH[1], 'column': two}]
+    lines = Lines(layout(its, header=one == 'u' or two == 'x'))
+    sent = {'command': np.array([1e-3, 2e-3]), 'measured': np.array([3e-3, 4e-3])}
+    if lines._places is None:
+        assert lines.decoded([lines.head()])[1] == 0
+    values, bad = lines.decoded(lines.encoded(sent))
+    assert not bad
+    assert values['command'].tolist() == [1.0, 2.0]
+    assert values['measured'].tolist() == [3.0, 4.0]
 
 
 def test_lines_have_no_packets():
@@ -185,10 +241,6 @@ def test_lines_bring_back_every_bit():
     values, bad = lines.decoded(lines.encoded(sent))
     assert not bad
     assert all(np.array_equal(values[name], sent[name]) for name in sent)
-
-
-NUMBERED = [{**BOTH[0], 'column': 2}, {**BOTH[1], 'column': 4}]
-NAMED = [{**BOTH[0], 'column': 'u'}, {**BOTH[1], 'column': 'x'}]
 
 
 @pytest.mark.parametrize(

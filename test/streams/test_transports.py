@@ -71,6 +71,22 @@ def test_a_record_arrives_bit_by_bit(scheme, seal):
     assert (np.diff(stamps) > 0).all() and abs(stamps[0] * 1e-9 - time.time()) < 120.0
 
 
+@pytest.mark.parametrize('scheme', ['tcp', 'lsl'])
+@pytest.mark.parametrize('columns', [('cmd', 'pos'), (2, 1), ('cmd', 1)])
+def test_what_is_sent_is_heard_by_the_same_layout(scheme, columns):
+    """Names of columns were not sent, and numbers did not count."""
+    pair = [{**field, 'column': column} for field, column in zip(PLAIN_PAIR, columns, strict=True)]
+    at, its, what = address(scheme), terms(layout(pair, rate=1000)), record(60)
+    reception = Reception(its.layout, 1000.0, in_order=True)
+    with closing(listen(at, its)) as listener:
+        thread = sent(at, its, what)
+        _, command, measured, _ = joined(received(listener, 60, reception))
+        thread.join(60.0)
+    assert np.allclose(command, what.command, rtol=1e-14)
+    assert np.allclose(measured, what.measured, rtol=1e-14)
+    assert not listener.counts['malformed']
+
+
 def test_datagrams_that_are_not_for_us_are_counted_and_left_out():
     at = address('udp')
     its = terms(seal=SEAL)

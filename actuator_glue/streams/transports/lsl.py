@@ -14,7 +14,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
-from actuator_glue.streams.lines import places
+from actuator_glue.streams.lines import label, places, sent_columns
 from actuator_glue.streams.transports import AT_ONCE, Terms, Transport, no_seal, samples
 
 # How long `send` waits for somebody to listen [s]: discovery takes a second or two.
@@ -127,13 +127,11 @@ class LslSender:
     def __init__(self, address: Address, terms: Terms) -> None:
         no_seal(address, terms)
         lsl = library(terms.allowed.entries)
-        names = [f.name for f in terms.layout.sample for _ in range(f.count)]
-        self._layout = terms.layout
+        self._columns = sent_columns(terms.layout)
         self._period = 1.0 / terms.rate
-        info = lsl.StreamInfo(
-            address.name, 'servo', len(names), terms.rate, 'double64', f'{address.name}-sender'
-        )
-        info.set_channel_labels(names)
+        name, channels = address.name, len(self._columns)
+        info = lsl.StreamInfo(name, 'servo', channels, terms.rate, 'double64', f'{name}-sender')
+        info.set_channel_labels([label(field) for field in self._columns])
         self._outlet, self._clock = lsl.StreamOutlet(info), lsl.local_clock
         if not self._outlet.wait_for_consumers(PATIENCE):
             raise InputError(f'{address}: nobody listens to this stream after {PATIENCE:g} s')
@@ -143,13 +141,13 @@ class LslSender:
         """Send consecutive samples as one chunk."""
         size = len(values['command'])
         columns = []
-        for field in self._layout.sample:
-            if field.name == 'counter':
+        for field in self._columns:
+            if not field.role:
+                columns.append(np.zeros(size))
+            elif field.name == 'counter':
                 columns.append(values['counter'].astype(np.float64))
-            elif field.role:
-                columns.append(field.sent(values[field.name]))
             else:
-                columns += [np.zeros(size)] * field.count
+                columns.append(field.sent(values[field.name]))
         if not self._sent:
             self._start = self._clock() - (size - 1) * self._period
         self._sent += size

@@ -127,7 +127,7 @@ class TcpSender:
         self._lines = Lines(terms.layout)
         self._seal = terms.seal
         self._socket = sockets.connected(address, socket.SOCK_STREAM)
-        if terms.layout.header:
+        if terms.layout.header or self._lines.by_name:
             self._put([self._lines.head()])
 
     def send(self, values: Mapping[str, Array]) -> int:
