@@ -42,9 +42,12 @@ class DiagnoserNode(WorkingNode):
     """Collects samples, watches the coverage, and has a worker process diagnose."""
 
     def __init__(self) -> None:
+        # The goal of the request that is being diagnosed; it leaves with the request's outcome.
         self._goal: Any = None
         self._request: diagnoser_worker.Request | None = None
-        self._swap: Any = None
+        self._ended: tuple[diagnoser_worker.Outcome, Any] | None = None
+        # What the estimator was asked, and until when its answer is waited for.
+        self._swaps: dict[Any, float] = {}
         super().__init__('diagnoser', diagnoser_worker.SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
@@ -63,7 +66,7 @@ class DiagnoserNode(WorkingNode):
             self,
             Diagnose,
             '~/diagnose',
-            execute_callback=self._conclude,
+            execute_callback=lambda _: None,  # each goal is executed with its outcome
             goal_callback=self._asked,
             handle_accepted_callback=self._accepted,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
@@ -105,6 +108,8 @@ class DiagnoserNode(WorkingNode):
             text = f'given up after {seconds:.0f} s: the node was deactivated'
             self.complain('diagnosis', f'{text}; a launch waits longer with linger:=SECONDS')
             self._fail(diagnoser_worker.Outcome(message=text))
+        for swap in list(self._swaps):
+            swap.cancel()
 
     def do_report(self) -> None:
         """Coverage, what is being done, and what explains the samples."""
@@ -210,7 +215,7 @@ class DiagnoserNode(WorkingNode):
         return GoalResponse.ACCEPT
 
     def _accepted(self, handle: Any) -> None:
-        """Start; the goal is executed, which ends it, when the outcome is there."""
+        """Start; the goal is executed, which ends it, when its outcome is there."""
         self._goal = handle
         try:
             streamed = () if handle.request.records else tuple(self.collector.records())
@@ -255,23 +260,25 @@ class DiagnoserNode(WorkingNode):
         publish(self._diagnosis, head, diagnoser_worker.fields(outcome))
         self._explained.diagnosis(outcome.diagnosis.to_json())
         self.get_logger().info(outcome.message)
-        self._request, self._told = None, outcome
         if self.loop.diagnosing == 'the stream':
             self._remembered = outcome.remembered
+        self._ended = outcome, self._goal
+        self._request = self._goal = None
         self._take(outcome.concluded)
-        if self._swap is None:
-            self._finish(outcome)
+        if self._ended is not None:  # nothing is to be carried
+            self._finish(*self._ended)
 
     def _carry(self, proposal: Proposal) -> None:
         """Have the estimator carry other structures; the diagnosis ends with its answer."""
-        outcome = self._told
+        assert self._ended is not None
+        (outcome, goal), self._ended = self._ended, None
         if not self._model_client.service_is_ready():
             self.complain('set_model', f'{self._model_client.srv_name} is not there')
+            self._finish(outcome, goal)
             return
 
         def answered(future: Any) -> None:
-            if self._swap is not future:
-                return
+            self._swaps.pop(future, None)
             response = future.result()
             if response is None:
                 self.complain('set_model', f'no answer within {ANSWER_SECONDS:g} s')
@@ -280,37 +287,36 @@ class DiagnoserNode(WorkingNode):
                 outcome.applied = True
             else:
                 self.complain('set_model', f'the estimator refuses: {response.message}')
-            self._finish(outcome)
+            self._finish(outcome, goal)
 
-        self._swap = self._model_client.call_async(diagnoser_worker.requested(proposal))
-        self._swap.add_done_callback(self.guarded(answered))
-        self._swap_end = time.monotonic() + ANSWER_SECONDS
+        swap = self._model_client.call_async(diagnoser_worker.requested(proposal))
+        self._swaps[swap] = time.monotonic() + ANSWER_SECONDS
+        swap.add_done_callback(self.guarded(answered))
 
     def _check(self) -> None:
         """Give up what is cancelled, and waiting for an answer that was lost."""
         if self._goal is not None and self._request is not None and self._goal.is_cancel_requested:
             self.give_up()
             self._fail(diagnoser_worker.Outcome(message='cancelled'))
-        if self._swap is not None and time.monotonic() > self._swap_end:
-            self._swap.cancel()
+        for swap, end in list(self._swaps.items()):
+            if time.monotonic() > end:
+                swap.cancel()
 
     def _fail(self, outcome: diagnoser_worker.Outcome) -> None:
         """End without a diagnosis; the loop goes on."""
-        self._request = None
-        self._finish(outcome)
+        goal = self._goal
+        self._request = self._goal = None
+        self._finish(outcome, goal)
         if self.active:
             self._take(live.GivenUp())
 
-    def _finish(self, outcome: diagnoser_worker.Outcome) -> None:
-        self._swap = None
-        self._outcome = outcome
+    def _finish(self, outcome: diagnoser_worker.Outcome, goal: Any) -> None:
         self.health.values['last diagnosis'] = outcome.message
-        if self._goal is not None:
-            self._goal.execute()
+        if goal is not None:
+            goal.execute(lambda handle: self._result(handle, outcome))
 
-    def _conclude(self, handle: Any) -> Any:
-        """End a goal whose outcome is known."""
-        outcome, self._goal = self._outcome, None
+    def _result(self, handle: Any, outcome: diagnoser_worker.Outcome) -> Any:
+        """End a goal with its outcome."""
         result = Diagnose.Result(
             success=outcome.diagnosis is not None,
             message=outcome.message,
