@@ -10,6 +10,7 @@ ros2 launch actuator_glue demo.launch.py partition:=benchmark_case_1
 ros2 launch actuator_glue demo.launch.py effect:=backlash namespace:=east
 """
 
+from actuator_glue.errors import InputError
 from actuator_glue.nodes.launching import description, node, truth
 
 ARGUMENTS = {
@@ -21,7 +22,7 @@ ARGUMENTS = {
     'layout': ('', 'layout of source'),
     'rate': ('0.0', 'sample rate of source [Hz], 0 for what its layout says'),
     'results': ('', 'where results go back to, udp://HOST:PORT or lsl:NAME'),
-    'stiffness': ('-1.0', 'specimen stiffness [N/m] of data or source, -1 for what it says'),
+    'stiffness': ('-1.0', 'specimen stiffness [N/m], -1 for what data or source says'),
     'replay': ('', 'bag whose samples are published again'),
     'duration': ('60.0', 'length of the simulated test [s]'),
     'effect': ('', 'effect of the simulated actuator that no node is told of'),
@@ -40,19 +41,28 @@ ARGUMENTS = {
 
 def stream(given):
     """Return the node that streams, and its parameters."""
+    several = [name for name in ('data', 'source', 'replay') if given[name]]
+    if len(several) > 1:
+        raise InputError(
+            f'{" and ".join(several)} are given, and one stream is launched: keep one'
+        )
+    # All that is given: the node says what does nothing.
     laboratory = {
         'specimen_stiffness': float(given['stiffness']),
         'results': given['results'],
+        'channels': given['channels'],
+        'layout': given['layout'],
+        'rate': float(given['rate']),
     }
     if given['replay']:
         return 'replay', {'bag': given['replay'], 'clock': False}
     if given['source']:
-        live = {'source': given['source'], 'layout': given['layout'], 'rate': float(given['rate'])}
-        return 'lab_bridge', laboratory | live
+        return 'lab_bridge', laboratory | {'source': given['source']}
     if given['data']:
-        file = {'file': given['data'], 'channels': given['channels'], 'preview': 3.0}
-        return 'lab_bridge', laboratory | file
+        return 'lab_bridge', laboratory | {'file': given['data'], 'preview': 3.0}
+    stiffness = float(given['stiffness'])
     return 'actuator_sim', {
+        **({} if stiffness < 0.0 else {'specimen_stiffness': stiffness}),
         'duration': float(given['duration']),
         'preview': 3.0,
         'undeclared_effect': given['effect'],

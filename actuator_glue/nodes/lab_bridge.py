@@ -75,6 +75,10 @@ SPECS = (
 )
 
 
+# Parameters that say something of files only, or of sources only.
+_OF_FILES, _OF_SOURCES = ('channels', 'speed', 'preview'), ('layout', 'rate')
+
+
 class LabBridgeNode(streamer.Streamer):
     """Publishes the samples of a file at their own rate, or of a live source as they come."""
 
@@ -107,6 +111,20 @@ class LabBridgeNode(streamer.Streamer):
         self._source = kind(self, values, out)
         for line in self._source.described():
             self.get_logger().info(line)
+        self._tell_idle(values)
+
+    def _tell_idle(self, values: Mapping[str, Any]) -> None:
+        """Warn of what was given and does nothing: nobody would look for it."""
+        live = bool(values['source'])
+        kind, other, idle = (
+            ('source', 'file', _OF_FILES) if live else ('file', 'source', _OF_SOURCES)
+        )
+        for spec in SPECS:
+            if spec.name in idle and values[spec.name] != spec.default:
+                self.get_logger().warning(
+                    f'{spec.name} = {values[spec.name]!r} says something of a {other}, and a '
+                    f'{kind} is given: it does nothing'
+                )
 
     def do_activate(self) -> None:
         """Begin the stream, and listen for results."""

@@ -9,6 +9,7 @@ import pytest
 from launching_fake import LAUNCH, Launched, Noted, launched
 from ros_nodes import recorded
 
+from actuator_glue.errors import InputError
 from actuator_glue.nodes import base, parameter_file, suite, viewer
 
 KNOWN = parameter_file.NODES | {'viewer': viewer.SPECS}
@@ -48,6 +49,19 @@ def test_a_launch_file_names_what_exists(file, way):
         for name, value in node.parameters[1].items():
             if name != 'use_sim_time':
                 assert type(value) is type(specs[name].default), (node.executable, name)
+
+
+def test_what_is_given_of_a_stream_is_used_or_said():
+    """A stiffness said nothing of the simulator, and of two streams one was left out unsaid."""
+    stiffness = [
+        launched('demo', **given)[0][-1].parameters[1].get('specimen_stiffness', 'usual')
+        for given in ({}, {'stiffness': '1e5'}, {'data': 'x.csv'}, {'data': 'x', 'stiffness': '0'})
+    ]
+    assert stiffness == ['usual', 1e5, -1.0, 0.0]
+    # Passed on, for the node to say that it does nothing.
+    assert launched('demo', data='x.csv', rate='500.0')[0][-1].parameters[1]['rate'] == 500.0
+    with pytest.raises(InputError, match=r'data and source are given.*keep one'):
+        launched('demo', data='x.csv', source='udp://127.0.0.1:5005')
 
 
 def test_every_stream_can_be_launched():

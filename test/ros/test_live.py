@@ -229,6 +229,29 @@ def test_bytes_in_another_order_are_told_where_neither_counter_nor_time_shows_th
     assert 'check byte_order' in said['out of range']
 
 
+@pytest.mark.parametrize(
+    ('live', 'given', 'idle'),
+    [
+        (False, {'rate': 500.0}, ['rate = 500.0']),
+        (False, {'channels': '', 'speed': 50.0, 'preview': 1.0}, []),
+        (True, {'speed': 2.0, 'channels': 'map.yaml'}, ["channels = 'map.yaml'", 'speed = 2.0']),
+        (True, {'block': 20, 'hold': 'zoh', 'actuator': 'east'}, []),
+    ],
+)
+def test_what_says_nothing_of_a_source_or_file_is_told(live, given, idle, start, probe, tmp_path):
+    file = tmp_path / 'x.csv'
+    rows = [f'{i / 100},{i % 7 * 1e-4},{(i - 2) % 7 * 1e-4}\n' for i in range(200)]
+    file.write_text('time_s,command_m,measured_m\n' + ''.join(rows))
+    its = {'file': str(file)}
+    if live:
+        its = {'source': f'udp://127.0.0.1:{free_port()}', 'rate': 500.0}
+    bridge = start('lab_bridge', specimen_stiffness=0.0, **its, **given)
+    probe.until(lambda: 'the stream begins' in bridge.text or not bridge.alive)
+    told = [line for line in bridge.text.splitlines() if 'does nothing' in line]
+    assert len(told) == len(idle), bridge.text
+    assert all(name in line for name, line in zip(idle, told, strict=True))
+
+
 @pytest.mark.parametrize('quiet', [0.0, 1e-40])
 def test_what_rests_is_not_taken_for_bytes_in_another_order(quiet, tmp_path):
     """A simulated actuator that has come to rest is at numbers near zero."""
