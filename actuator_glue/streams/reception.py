@@ -26,6 +26,8 @@ _JITTER = 0.1
 _ARRIVAL_SECONDS, _ARRIVAL_STRETCHES = 5.0, 2
 # Times whose steps are looked at together where they alone tell the order, and over how long [s].
 _STEPS, _STEP_SECONDS = 2048, 3.0
+# Share of what a time lies off its number by which the next ones are expected to.
+_FOLLOW = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,7 @@ class Reception:
             rate, modulus, restarts=not signed, shuffled=not in_order, counts=self.counts
         )
         self._rates = _Rates(rate, layout, self.order)
+        self._by_time = _ByTime()
         self._arrived = 0
         self._last_time: float | None = None
         self._last_arrival = 0.0
@@ -146,7 +149,7 @@ class Reception:
         if self.order == 'counter' and rows.counter is not None:
             counter = rows.counter
         elif self.order == 'time' and rows.time is not None:
-            counter = np.rint(rows.time * self.rate).astype(np.int64)
+            counter = self._by_time.numbers(rows.time * self.rate)
         else:
             runs += self._jumped(rows.time, now)
             counter = np.arange(self._arrived, self._arrived + size, dtype=np.int64)
@@ -237,6 +240,29 @@ class Reception:
             (Run(run.index + a, run.rows[a:b], run.began and not a), a in begins)
             for a, b in pairwise([*cuts, len(run.rows)])
         ]
+
+
+class _ByTime:
+    """Numbers samples by their times where nothing else counts them.
+
+    Times need not be multiples of the period: where they lie between them is followed, so that
+    neither their phase nor a drift within the clocks' tolerance makes two samples one.
+    """
+
+    def __init__(self) -> None:
+        self._phase: float | None = None
+
+    def numbers(self, times: Array) -> NDArray[np.int64]:
+        """Return the number of each sample, shape (n,); `times` are in sample periods."""
+        found = np.empty(len(times), dtype=np.int64)
+        phase = self._phase
+        for i, time in enumerate(times.tolist()):
+            if phase is None:
+                phase = time - round(time)
+            found[i] = number = round(time - phase)
+            phase += _FOLLOW * (time - phase - number)
+        self._phase = phase
+        return found
 
 
 class _Rates:

@@ -11,6 +11,13 @@ from actuator_glue.streams.reception import Reception
 
 START = 1_700_000_000 * 10**9
 BARE = layout([{'name': 'command', 'unit': 'm'}, {'name': 'measured', 'unit': 'm'}])
+TIMED = layout(
+    [
+        {'name': 'time', 'unit': 's'},
+        {'name': 'command', 'unit': 'm'},
+        {'name': 'measured', 'unit': 'm'},
+    ]
+)
 PACKETS = layout(
     [{'name': 'command', 'unit': 'm'}, {'name': 'measured', 'unit': 'm'}],
     packet=[{'name': 'time', 'unit': 's'}],
@@ -126,6 +133,41 @@ def test_stamps_never_go_back(block, held, rng_seed):
     edges = [(s.stamp_ns, s.stamp_ns + (len(s.command) - 1) * 1_000_000) for s in found]
     for (_, last), (first, _) in pairwise(edges):
         assert first > last
+
+
+def by_time_alone(times, rate=1000.0):
+    """What comes of single samples whose times [s] alone tell their order, each 1 ms later."""
+    reception, found = Reception(TIMED, rate), []
+    for i, time in enumerate(times.tolist()):
+        value = np.array([1e-6 * i])
+        rows = Rows(value, value, None, None, np.array([time]), START + i * 10**6)
+        found += reception.push(rows, i * 1e-3)
+    found += reception.waited(len(times), START + len(times) * 10**6)
+    command = np.concatenate([s.command for s in found])
+    index = np.concatenate([s.index + np.arange(len(s.command)) for s in found])
+    return reception.counts, index, np.rint(1e6 * command).astype(int)
+
+
+@pytest.mark.parametrize('epoch', [0.0, 1.7e9])
+@pytest.mark.parametrize('phase', [0.0, 0.25, 0.5, 0.77])
+@pytest.mark.parametrize(('drift', 'jitter'), [(0.0, 0.0), (0.0, 0.1), (5e-5, 0.05), (-2e-3, 0.0)])
+def test_times_need_not_be_multiples_of_the_period(epoch, phase, drift, jitter):
+    """Where they lie half between, each second sample was taken for a repeated one."""
+    order = np.arange(4000)
+    order[[500, 501, 2000, 2001]] = [501, 500, 2001, 2000]
+    lie = (1.0 + drift) * order + phase
+    lie += jitter * np.random.default_rng(5).standard_normal(len(order))
+    counts, index, command = by_time_alone(epoch + lie / 1000.0)
+    assert +counts == {'reordered': 2}
+    assert np.array_equal(index, np.arange(4000)) and np.array_equal(order[command], index)
+
+
+def test_times_tell_what_is_lost_repeated_and_far_off():
+    taken = np.delete(np.arange(3000), slice(1000, 1007))
+    lie = np.insert(taken + 0.5, 2000, [1e9, taken[1999] + 0.5])
+    counts, index, command = by_time_alone(lie / 1000.0)
+    assert +counts == {'lost': 7, 'implausible': 1, 'duplicates': 1}
+    assert np.array_equal(index, taken) and len(command) == len(taken)
 
 
 def test_a_time_that_is_no_number_drops_no_sample():
