@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_glue.clock_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.errors import InputError
@@ -17,17 +16,14 @@ from actuator_glue.records import Array
 from actuator_glue.streams.clock import HELD_UP, STEP, ClockMap
 from actuator_glue.streams.layout import TYPES, Layout, Rows
 from actuator_glue.streams.sequence import Run, Sequence
+from actuator_glue.streams.times import Jumps, Numbers
 
 # What tells the order of samples: a counter, else their times, else that they arrive in order.
 Order: TypeAlias = Literal['counter', 'time', 'arrival']
-# Arrival in order: times further apart than this are a gap, not jitter [s].
-_JITTER = 0.1
 # Arrivals bunch up: their rate is taken over stretches this long [s], and two of them.
 _ARRIVAL_SECONDS, _ARRIVAL_STRETCHES = 5.0, 2
 # Times whose steps are looked at together where they alone tell the order, and over how long [s].
 _STEPS, _STEP_SECONDS = 2048, 3.0
-# Share of what a time lies off its number by which the next ones are expected to.
-_FOLLOW = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,9 +85,9 @@ class Reception:
             rate, modulus, restarts=not signed, shuffled=not in_order, counts=self.counts
         )
         self._rates = _Rates(rate, layout, self.order)
-        self._by_time = _ByTime()
+        self._numbers = Numbers()
         self._arrived = 0
-        self._last_time: float | None = None
+        self._jumps = Jumps(rate)
         self._last_arrival = 0.0
         # Index and time of the newest sample that has a time: as it came, and as it was stamped.
         self._timed: tuple[int, float] | None = None
@@ -143,35 +139,31 @@ class Reception:
         columns[:, 0], columns[:, 1] = rows.command, rows.measured
         columns[:, 2] = 0.0 if rows.force is None else rows.force
         columns[:, 3] = np.nan if rows.time is None else rows.time
-        runs: list[Run] = []
+        if self.order == 'counter' and rows.counter is not None:
+            return self._sequence.push(rows.counter, columns, now)
         if self.order == 'time' and rows.time is not None:
             self._rates.steps(rows.time)
-        if self.order == 'counter' and rows.counter is not None:
-            counter = rows.counter
-        elif self.order == 'time' and rows.time is not None:
-            counter = self._by_time.numbers(rows.time * self.rate)
-        else:
-            runs += self._jumped(rows.time, now)
-            counter = np.arange(self._arrived, self._arrived + size, dtype=np.int64)
-            self._arrived += size
-        return runs + self._sequence.push(counter, columns, now)
+            return self._sequence.push(self._numbers.of(rows.time * self.rate), columns, now)
+        return self._arrive(rows.time, columns, now)
 
-    def _jumped(self, time: NDArray[np.float64] | None, now: float) -> list[Run]:
-        """Leave a gap where the times of samples that arrive in order jump ahead."""
-        if time is None:
-            return []
-        before, self._last_time = self._last_time, float(time[-1])
-        if before is None:
-            return []
-        missing = round((float(time[0]) - before) * self.rate) - 1
-        if missing < max(1, _JITTER * self.rate) or missing > 3600 * self.rate:
-            return []
-        self.counts['lost'] += missing
-        return self._step_over(missing, now)
+    def _arrive(self, time: Array | None, columns: Array, now: float) -> list[Run]:
+        """Number samples as they come, with a gap where their times jump ahead."""
+        runs: list[Run] = []
+        start = 0
+        gaps = [] if time is None else self._jumps.found(time)
+        for stop, missing in [*gaps, (len(columns), 0)]:
+            counter = np.arange(self._arrived, self._arrived + stop - start, dtype=np.int64)
+            self._arrived += stop - start
+            runs += self._sequence.push(counter, columns[start:stop], now)
+            if missing:
+                self.counts['lost'] += missing
+                runs += self._step_over(missing, now)
+            start = stop
+        return runs
 
     def _interrupted(self, now: float) -> list[Run]:
         """A connection begins: how many samples went by is known only by a counter or the time."""
-        self._last_time = None
+        self._jumps = Jumps(self.rate)
         if self.order != 'arrival' or not self._arrived:
             return []
         self.counts['interruptions'] += 1
@@ -240,29 +232,6 @@ class Reception:
             (Run(run.index + a, run.rows[a:b], run.began and not a), a in begins)
             for a, b in pairwise([*cuts, len(run.rows)])
         ]
-
-
-class _ByTime:
-    """Numbers samples by their times where nothing else counts them.
-
-    Times need not be multiples of the period: where they lie between them is followed, so that
-    neither their phase nor a drift within the clocks' tolerance makes two samples one.
-    """
-
-    def __init__(self) -> None:
-        self._phase: float | None = None
-
-    def numbers(self, times: Array) -> NDArray[np.int64]:
-        """Return the number of each sample, shape (n,); `times` are in sample periods."""
-        found = np.empty(len(times), dtype=np.int64)
-        phase = self._phase
-        for i, time in enumerate(times.tolist()):
-            if phase is None:
-                phase = time - round(time)
-            found[i] = number = round(time - phase)
-            phase += _FOLLOW * (time - phase - number)
-        self._phase = phase
-        return found
 
 
 class _Rates:

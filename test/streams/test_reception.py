@@ -170,6 +170,47 @@ def test_times_tell_what_is_lost_repeated_and_far_off():
     assert np.array_equal(index, taken) and len(command) == len(taken)
 
 
+def in_order(times, size, rate=1000.0):
+    """Indices that come of samples in order with times [s], so many of them at once."""
+    reception, found = Reception(TIMED, rate, in_order=True), []
+    for first in range(0, len(times), size):
+        part = np.asarray(times[first : first + size], dtype=np.float64)
+        arrived = float(part[-1])
+        rows = Rows(part, part, None, None, part, START + round(arrived * 1e9))
+        found += reception.push(rows, arrived)
+        found += reception.waited(arrived, START + round(arrived * 1e9))
+    return reception, np.concatenate([s.index + np.arange(len(s.command)) for s in found])
+
+
+@pytest.mark.parametrize('size', [1, 20, 64, 1000])
+def test_a_gap_is_one_however_lines_arrive(size):
+    """Within what a socket hands over at once it was none, or a clock that was set."""
+    taken = np.delete(np.arange(12_000), [*range(3010, 3510), *range(4000, 9000)])
+    reception, index = in_order(taken / 1000.0, size)
+    assert np.array_equal(index, taken) and +reception.counts == {'lost': 5500}
+    assert reception.rate_fault == ''
+
+
+@pytest.mark.parametrize('size', [1, 20, 64, 1000])
+@pytest.mark.parametrize('step', [0.05, 0.1, 1.0])
+def test_times_of_few_digits_are_no_gaps(size, step):
+    """A text of whole seconds: half of such a stream was said to be lost."""
+    counted = np.arange(300, 9300)
+    reception, index = in_order(np.floor(counted / 1000.0 / step) * step, size)
+    assert np.array_equal(index, np.arange(9000)) and not +reception.counts
+    gap = np.where(counted < 4100, counted, counted + 3000)
+    reception, index = in_order(np.floor(gap / 1000.0 / step) * step, size)
+    assert abs(reception.counts['lost'] - 3000) <= 1000.0 * step
+    assert len(index) == 9000
+
+
+@pytest.mark.parametrize('size', [1, 20, 64])
+def test_times_in_another_unit_are_another_rate_and_no_gaps(size):
+    reception, index = in_order(np.arange(3000.0), size)
+    assert np.array_equal(index, np.arange(3000)) and not reception.counts['lost']
+    assert 'by the sender' in reception.rate_fault
+
+
 def test_a_time_that_is_no_number_drops_no_sample():
     """The counter tells the order: such samples are kept, counted, and stamped by the others."""
     table = np.zeros((300, 5))
