@@ -50,6 +50,8 @@ FAULTS = {
 # A simulated actuator at rest comes to them in the end, but never begins with them [m].
 _LEAST = 1e-30
 _JUDGED = 3.0  # seconds of samples that are not zero
+# A counter that leaves the same gap before more of so many messages counts no samples [1].
+_MANY, _FEW = 0.5, 50
 # Silence of this length is reported [s].
 SILENT = 1.0
 # Longest pause between two looks at the socket [s].
@@ -105,6 +107,7 @@ class LiveSource:
         self._finite: Counter[str] = Counter()
         self._heard = self._nonzero = 0
         self._largest = 0.0
+        self._alike = self._gap = self._next = self._before = 0
 
     def described(self) -> list[str]:
         """Return what is listened to."""
@@ -119,6 +122,8 @@ class LiveSource:
         """Yield what has arrived, for ever."""
         self._reception = self._fresh()
         self._nonzero, self._largest = 0, 0.0
+        self._alike = self._gap = self._next = 0
+        self._before = self._messages()
         self._announce()
         # Before it is said that the stream begins: a program that waits for that sends at once.
         self._node.introduce(self._drain)
@@ -167,6 +172,15 @@ class LiveSource:
             self._node.complain(
                 'out of range', f'no displacement reaches {_LEAST:g} m: {_CHECK}', ERROR
             )
+        messages = self._messages() - self._before
+        if messages > _FEW and self._alike > _MANY * messages:
+            self._node.complain(
+                'counter',
+                'most messages have the same gap before them: the counter counts something else '
+                'than the layout says (counts: packets or samples), or is that of a faster loop; '
+                'give it another name there, so that it is stepped over',
+                ERROR,
+            )
         return {
             'source': str(self._address),
             'order by': self._reception.order,
@@ -192,6 +206,10 @@ class LiveSource:
 
     def _publish(self, found: list[Samples]) -> None:
         for samples in found:
+            gap = samples.index - self._next
+            self._alike += 0 < gap == self._gap
+            self._gap = gap or self._gap
+            self._next = samples.index + len(samples.command)
             if samples.began and self._reception.counts['restarts']:
                 self._announce()
             self._out.begin(self._actuator, self._period, samples.stamp_ns, samples.index)

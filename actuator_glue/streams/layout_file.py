@@ -93,6 +93,8 @@ def _field(content: object, where: str) -> Field:
         of_file(made.name, str(unit) if unit else None, f'{where}: {made.name}')
         if made.scale == 0.0:
             raise InputError(f'{where}: scale is 0; every value would be the same')
+    if made.name == 'counter' and (made.scale, made.offset) != (1.0, 0.0):
+        raise InputError(f'{where}: a counter counts as it is sent; leave out scale and offset')
     if made.role and made.count != 1:
         raise InputError(f'{where}: {made.name} is one value; count is for those stepped over')
     return made

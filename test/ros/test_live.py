@@ -280,6 +280,31 @@ def test_a_wrong_rate_is_told_in_the_same_words_each_time(tmp_path):
     assert said and all('give the true one' in line for line in said)
 
 
+@pytest.mark.parametrize(
+    ('step', 'lost', 'wrong'),
+    [
+        (1, (), False),
+        (10, (), True),
+        (10, (100, 300), True),
+        # Half of them are lost, on a bad line.
+        (1, np.flatnonzero(np.random.default_rng(3).random(600) < 0.6), False),
+    ],
+)
+def test_a_counter_of_another_loop_is_told_as_that(step, lost, wrong, tmp_path):
+    """Each sample came with a gap, and a rate that had it so was asked for."""
+    sent = [struct.pack('<Idd', step * i, x, x) for i, x in enumerate(MOTION[:600])]
+    sent = [message for i, message in enumerate(sent) if i not in lost]
+    said = told(tmp_path, {'rate': 1000, 'sample': COUNTED}, sent)
+    assert ('the counter counts something else' in said['counter']) is wrong
+
+
+def test_a_counter_of_samples_is_no_counter_of_packets(tmp_path):
+    packets = [struct.pack('<I8d', 4 * i, *range(8)) for i in range(200)]
+    its = {'rate': 1000, 'packet': COUNTED[:1], 'sample': PAIR, 'samples': 4}
+    assert 'counts: packets or samples' in told(tmp_path, its, packets)['counter']
+    assert not told(tmp_path, {**its, 'counts': 'samples'}, packets)['counter']
+
+
 def test_a_message_of_another_size_is_told_with_both_sizes(tmp_path):
     twice = [2 * struct.pack('<Idd', i, x, x) for i, x in enumerate(MOTION[:20])]
     said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, twice)

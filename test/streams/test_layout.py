@@ -62,6 +62,7 @@ def test_what_is_no_shipped_layout_is_said_with_those_that_are(name, tmp_path, m
         ({'sample': [{**BOTH[0], 'type': ['f64']}, BOTH[1]]}, 'use one of float64'),
         ({'sample': [{**BOTH[0], 'scale': 0}, BOTH[1]]}, 'scale is 0'),
         ({'sample': [{**BOTH[0], 'count': 2}, BOTH[1]]}, 'command is one value'),
+        ({'sample': [{'name': 'counter', 'scale': 0.1}, *BOTH]}, 'counts as it is sent'),
         ({'sample': BOTH, 'byteorder': 'big'}, 'did you mean byte_order'),
         ({'sample': BOTH, 'byte_order': 'middle'}, 'use one of little, big'),
         ({'sample': BOTH, 'rate': 1e9}, 'outside'),
