@@ -81,6 +81,7 @@ class MarginNode(base.SuiteNode):
         self.watch = _watch(self.parameters.values())
         self.windows = 0
         self.last: Watched | None = None
+        self._doubts: list[str] = []
         self._silence = Silence(time.monotonic())
         compiling = Beside(self, self._compile)
 
@@ -88,6 +89,7 @@ class MarginNode(base.SuiteNode):
             if compiling.done:
                 timer.cancel()
                 self._silence.heard(time.monotonic())
+                self.subscribe(topics.POSTERIOR, self._posterior)
                 self.subscribe(topics.DRAWS, self._take)
 
         timer = self.every(0.1, look)
@@ -112,12 +114,21 @@ class MarginNode(base.SuiteNode):
             'delay margin (s)': float(self.last.margin[1]),
             'computing (s)': self._seconds,
         }
+        if self._doubts:
+            self.complain(
+                'doubt',
+                'P(unstable) and margin rest on a posterior that is doubted: '
+                f'{", ".join(self._doubts)}; /diagnostics of the estimator says why',
+            )
         if self.last.warning:
             self.complain(
                 'stability',
                 f'P(unstable) = {p.value:.3g} ({p.lower:.3g} to {p.upper:.3g}) in '
                 f'{self.watch.partition.name}: more delay compensation, or end the test',
             )
+
+    def _posterior(self, message: Any) -> None:
+        self._doubts = list(getattr(message, 'doubts', ()))
 
     def _take(self, message: Any) -> None:
         started = time.monotonic()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from actuator_glue_msgs.msg import PosteriorDraws, StabilityMargin
+from actuator_glue_msgs.msg import PosteriorDraws, PosteriorMoments, StabilityMargin
 from ros_nodes import QUICK
 from windows import windows_of_a_test
 
@@ -77,6 +77,16 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
         assert told in node.text
     assert 'LinAlgError' not in node.text and 'internal error' not in node.text
     assert ('P(unstable)' in str(probe.value('margin', 'stability (last)', ''))) == unstable
+    assert 'doubted' not in node.text
+    posterior = probe.create_publisher(PosteriorMoments, 'posterior', topics.POSTERIOR.qos)
+    probe.until(lambda: posterior.get_subscription_count() == 1)
+
+    def told():
+        posterior.publish(PosteriorMoments(window=4, doubts=['channels-wrong']))
+        probe.for_a_while(0.2)
+        return 'a posterior that is doubted: channels-wrong' in node.text
+
+    probe.until(told, what='a doubt')
     assert node.end() == 0
 
 
