@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 from actuator_glue.streams.layout import TYPES, Field, Layout
 
@@ -62,6 +63,9 @@ class Packed:
 
         Args:
             values: SI units by field, `counter` as whole numbers, each of shape (n,).
+
+        Raises:
+            InputError: a value is beyond what its integer type holds.
         """
         many = self._layout.samples
         count = len(values['command']) // many
@@ -77,7 +81,19 @@ class Packed:
         return [data[i : i + self.size] for i in range(0, len(data), self.size)]
 
     def _sent(self, name: str, values: Array) -> Array:
-        return values if name == 'counter' else self._layout.fields[name].sent(values)
+        if name == 'counter':
+            return values  # it wraps as a controller's does
+        field = self._layout.fields[name]
+        sent = field.sent(values)
+        if TYPES[field.type][0] in 'iu' and sent.size:
+            limits = np.iinfo(TYPES[field.type])
+            beyond = sent[(np.rint(sent) < limits.min) | (np.rint(sent) > limits.max)]
+            if beyond.size:
+                raise InputError(
+                    f'{self._layout.source or "layout"}: {name} is sent as {beyond.flat[0]:g}, '
+                    f'which no {field.type} holds; give it another type, unit or scale'
+                )
+        return sent
 
 
 def _put(packets: NDArray[Any], at: str, sent: Array) -> None:
@@ -85,7 +101,7 @@ def _put(packets: NDArray[Any], at: str, sent: Array) -> None:
     if kind.kind not in 'iu':
         packets[at] = sent
         return
-    # A counter wraps as a controller's does; a value is rounded to its step.
+    # A counter wraps; a value is rounded to its step.
     narrow = np.rint(sent).astype(np.int64).astype(f'u{kind.itemsize}')
     packets[at] = narrow.view(f'{kind.kind}{kind.itemsize}')
 

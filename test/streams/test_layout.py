@@ -159,6 +159,30 @@ def test_what_is_packed_is_what_is_unpacked(kinds, order, many, head, counts):
     assert rows.counter.tolist() == whole.tolist()
 
 
+@pytest.mark.parametrize(
+    ('kind', 'most', 'fits'),
+    [
+        ('int16', 32.767, True),
+        ('int16', 32.768, False),
+        ('int16', -32.768, True),
+        ('uint16', -0.001, False),
+        ('uint16', -0.0004, True),
+        ('float32', 1e3, True),
+    ],
+)
+def test_a_value_that_its_type_cannot_hold_is_not_sent_as_another(kind, most, fits):
+    """It wrapped, as a counter does: a displacement jumped from one end to the other."""
+    its = layout([BOTH[0], {**BOTH[1], 'type': kind, 'scale': 1e-3}])
+    sent = {'command': np.zeros(2), 'measured': np.array([0.0, 1e-3 * most])}
+    packed = Packed(its, 1000.0)
+    if fits:
+        values = packed.decoded(b''.join(packed.encoded(sent)))
+        assert abs(its.fields['measured'].si(values['measured'])[1] - 1e-3 * most) < 6e-7
+    else:
+        with pytest.raises(InputError, match=f'measured is sent as .*no {kind} holds'):
+            packed.encoded(sent)
+
+
 def test_a_counter_that_is_no_number_is_left_out_and_told():
     found = layout([{'name': 'counter'}, *BOTH])
     table = np.array([[0.0, 1, 1], [np.nan, 2, 2], [1e300, 3, 3], [np.inf, 4, 4], [1.0, 5, 5]])
