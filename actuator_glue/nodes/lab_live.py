@@ -173,7 +173,8 @@ class LiveSource:
                 'out of range', f'no displacement reaches {_LEAST:g} m: {_CHECK}', ERROR
             )
         messages = self._messages() - self._before
-        if messages > _FEW and self._alike > _MANY * messages:
+        counted = self._reception.order == 'counter' and messages > _FEW
+        if counted and self._alike > _MANY * messages:
             self._node.complain(
                 'counter',
                 'most messages have the same gap before them: the counter counts something else '

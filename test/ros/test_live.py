@@ -298,6 +298,13 @@ def test_a_counter_of_another_loop_is_told_as_that(step, lost, wrong, tmp_path):
     assert ('the counter counts something else' in said['counter']) is wrong
 
 
+def test_times_of_another_rate_are_no_counter(tmp_path):
+    timed = [{'name': 'time', 'unit': 's'}, *PAIR]
+    slow = [struct.pack('<ddd', i / 100, x, x) for i, x in enumerate(MOTION)]
+    said = told(tmp_path, {'rate': 1000, 'sample': timed}, slow)
+    assert said['sample rate'] and not said['counter']
+
+
 def test_a_counter_of_samples_is_no_counter_of_packets(tmp_path):
     packets = [struct.pack('<I8d', 4 * i, *range(8)) for i in range(200)]
     its = {'rate': 1000, 'packet': COUNTED[:1], 'sample': PAIR, 'samples': 4}
