@@ -11,24 +11,20 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
-from actuator_glue.online import structures
 from actuator_glue.online.ahead import Ahead
+from actuator_glue.online.carried_structures import CarriedStructure, CarriedStructures
 from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.schedule import Begun, ReplayPosition, Schedule
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
-    Contradicted,
     Dropped,
     Event,
     Failed,
     Preview,
     Rejected,
-    Reweighed,
     Window,
-    structure_name,
 )
 from actuator_glue.online.structures import Proposal
 from actuator_glue.online.window_posterior import MOST_PATIENCE, Job, WindowFit
@@ -48,31 +44,6 @@ _CALMER = 0.8
 NEWS = 0.1
 
 
-@dataclass(slots=True, eq=False)
-class _Member:
-    """A structure that is carried, and what it keeps of its last result.
-
-    Attributes:
-        model: the structure.
-        knowledge: what earlier samples say of its parameters.
-        archive: points that its next window starts from.
-        epoch: actuator of these points.
-        frozen: its last posterior, with which it forecasts while it is not sampled.
-        waited: windows since its last result.
-        before: it is a reference that new structures must beat: Eq. (2), or carried before them.
-        worse: successive windows in which its forecasts were worse than a reference's.
-    """
-
-    model: ModelChoice
-    knowledge: Knowledge
-    archive: Array | None = None
-    epoch: int = -1
-    frozen: FrozenPosterior | None = None
-    waited: int = 0
-    before: bool = False
-    worse: int = 0
-
-
 @dataclass(slots=True)
 class _Beside:
     """A structure that is sampled beside the likeliest one.
@@ -85,7 +56,7 @@ class _Beside:
         joins: the running job uses the result.
     """
 
-    member: _Member
+    member: CarriedStructure
     job: Job
     handed: bool = False
     result: WindowFit | None = None
@@ -141,37 +112,36 @@ class Estimator:
         carried: Carried | None = None,
     ) -> None:
         self.settings = settings
-        self.proposal = Proposal.of(model)
+        self._members = CarriedStructures(settings, carried, Proposal.of(model))
         self.live = live
         self.schedule = schedule
         self.running: Job | None = None
         self._windows = SlidingWindows(settings)
         self._waiting: list[Window] = []
-        self._carried = carried
         self._applied = 0  # number of the schedule's models in use so far
         self._course = ReplayPosition()
         self._before: _Before | None = None
         self._patience = 1.0
         self._frozen: list[FrozenPosterior] = []
-        self._judged_to: int | None = None
         self._pending: Proposal | None = None
-        self._members: list[_Member] = []
-        self._log_prior = self._evidence = np.zeros(0)
         self._beside: _Beside | None = None
-        self._begin(self.proposal)
         self._ahead = Ahead()
 
     @property
     def model(self) -> ModelChoice:
         """The likeliest structure, or the one that the next window begins with."""
         proposal = self._pending
-        return self._members[0].model if proposal is None else proposal.structures[0].model
+        return self._members.leading.model if proposal is None else proposal.structures[0].model
+
+    @property
+    def proposal(self) -> Proposal:
+        """What is carried, as it was proposed last."""
+        return self._members.proposal
 
     @property
     def weights(self) -> tuple[tuple[ModelChoice, float], ...]:
         """The structures that are carried and their weights, the likeliest first."""
-        found = zip(self._members, self._shares().tolist(), strict=True)
-        return tuple((member.model, share) for member, share in found if share > 0.0)
+        return self._members.weights
 
     @property
     def tally(self) -> Tally:
@@ -249,9 +219,9 @@ class Estimator:
             if not self._course.exact or len(stops) != len(self._members):
                 stops = (None,) * len(self._members)
         self._take_in(window, stops)
-        job = self._job(self._members[0], window, stops[0])
-        weight, *shares = self._shares().tolist()
-        rivals = zip(self._members[1:], shares, strict=True)
+        job = self._job(self._members.leading, window, stops[0])
+        weight, *shares = self._members.shares().tolist()
+        rivals = zip(self._members.rivals, shares, strict=True)
         self.running = replace(
             job,
             ahead=self._ahead.between(window.end, job.forecast[1], window.record.period),
@@ -302,7 +272,7 @@ class Estimator:
         )
         beside.joins = beside.result is not None and stop != 0
 
-    def _rival(self, member: _Member, window: Window, weight: float) -> Job:
+    def _rival(self, member: CarriedStructure, window: Window, weight: float) -> Job:
         """Return the job of a less likely structure, which only forecasts from a window on."""
         standing = member.frozen if member.epoch == window.epoch else None
         beside, renewed = self._beside, 0
@@ -321,12 +291,12 @@ class Estimator:
     def _resume(self, window: Window, begun: Begun | None) -> None:
         """Start from the live run's points if the window before could not be recomputed."""
         if self._course.resumes(begun) and begun is not None and begun.archive is not None:
-            leading = self._members[0]
+            leading = self._members.leading
             if begun.archive.shape[1] == len(leading.model.names):
                 leading.archive, leading.epoch = begun.archive, window.epoch
         self._course.done(window.number)
 
-    def _job(self, member: _Member, window: Window, stop: int | None) -> Job:
+    def _job(self, member: CarriedStructure, window: Window, stop: int | None) -> Job:
         """Return the job of sampling one structure in a window."""
         model, record = member.model, window.record
         prior, before = member.knowledge.prior(window), self._before
@@ -368,16 +338,16 @@ class Estimator:
             del self._frozen[:-MAX_FROZEN]
         for member in self._members:
             member.waited += 1
-        events: list[Event] = list(_learned(self._members[0], result))
+        events: list[Event] = list(self._members.leading.learn(result))
         if self._beside is not None and self._beside.joins:
             assert self._beside.result is not None
             # That a window contradicts the prior of a less likely structure is not reported.
-            _learned(self._beside.member, self._beside.result)
+            self._beside.member.learn(self._beside.result)
             self._beside = None
-        leading = self._members[0]
+        leading = self._members.leading
         if leading.archive is not None:
             self._before = _Before(leading.archive, leading.model, leading.epoch)
-        events += self._weigh(result)
+        events += self._members.weigh(result)
         self._sample_beside(window)
         return events
 
@@ -386,7 +356,7 @@ class Estimator:
 
         Only after a window that is published, which a replay has, too.
         """
-        rivals = self._members[1:]
+        rivals = self._members.rivals
         if self._beside is not None and not any(self._beside.member is one for one in rivals):
             self._beside = None
         news = math.ceil(NEWS * self.settings.window / self.settings.hop)
@@ -400,127 +370,9 @@ class Estimator:
             self._beside = _Beside(longest, self._job(longest, window, None))
 
     def _begin(self, proposal: Proposal) -> None:
-        """Carry these structures from now on; a structure carried before keeps its knowledge.
-
-        Unless the proposal begins afresh: then only the points that its next window starts from.
-
-        Where there are several, Eq. (2) and the structures carried before are the references
-        that the others have to beat.
-        """
+        """Carry these structures from now on."""
         self._pending = self._beside = None
-        led = self._members[0] if self._members else None
-        began = None if led is None else led.knowledge.began_ns
-        old = {frozenset(member.model.effects): member for member in self._members}
-        carried = [(frozenset(model.effects), share) for model, share in self.weights]
-        self._members, told = [], []
-        for one in proposal.structures:
-            member = None if one.known is not None else old.get(frozenset(one.model.effects))
-            if member is None or _box(member.model) != _box(one.model):
-                known = Knowledge(self.settings, self._carried, one.known, began)
-                member = _Member(one.model, known)
-            elif proposal.afresh:
-                member.knowledge = Knowledge(self.settings, self._carried, None, began)
-            member.before, member.worse = False, 0
-            self._members.append(member)
-            told.append(replace(one, model=member.model))
-        self.proposal = replace(proposal, structures=tuple(told))
-        self._log_prior = proposal.log_weights
-        if len(self._members) > 1:
-            for member in self._members:
-                member.before = not member.model.effects
-            names = {frozenset(member.model.effects) for member in self._members}
-            most = structures.most_in_all(self.settings.window, self.settings.hop)
-            for effects, share in carried[: structures.MOST]:
-                if effects in names or len(self._members) == most:
-                    continue
-                stays = old[effects]
-                stays.before, stays.worse = True, 0
-                weight = max(structures.BEFORE * share, structures.BESIDE)
-                self._members.append(stays)
-                self._log_prior = np.append(self._log_prior, np.log(weight))
-        self._evidence = np.zeros(len(self._members))
-        self._judged_to = None
-
-    def _shares(self) -> Array:
-        """Return the weights (K,) of all members; 0 for one kept only as a reference."""
-        return structures.weights(self._log_prior, self._evidence)
-
-    def _weigh(self, result: WindowResult | WindowFit) -> list[Event]:
-        """Update weights by the forecasts a window judged; drop structures of little weight."""
-        if len(self._members) < 2 or not result.errors:
-            return []
-        settings, window = self.settings, result.window
-        since = settings.hop
-        if self._judged_to is not None:
-            since = max(since, (window.end - self._judged_to) * window.record.period)
-        self._judged_to = window.end
-        material = self.proposal.material
-        if np.isnan(material) and result.frozen is not None:
-            material = structures.MATERIAL * result.frozen.noise
-        memory = structures.MEMORY * settings.window
-        self._evidence = structures.moved(self._evidence, result.errors, material, since, memory)
-        before = self._members[0].model
-        worse = self._outdone(result.errors, material)
-        shares = self._shares()
-        carried = np.isfinite(self._log_prior)
-        order = [int(i) for i in np.argsort(-shares, kind='stable')]
-        out = [i for i in order if shares[i] < structures.LEAVES]
-        left = [self._members[i].model for i in out if carried[i]]
-        left = [before, *left] if worse else left
-        # Eq. (2) takes no time and stays as a reference for what the others add.
-        self._log_prior[out] = -np.inf
-        kept = [i for i in order if i not in out or self._compared(i)]
-        self._members = [self._members[i] for i in kept]
-        self._log_prior, self._evidence = self._log_prior[kept], self._evidence[kept]
-        if not left and self._members[0].model is before:
-            return []
-        now = tuple((model.effects, share) for model, share in self.weights)
-        said = ', '.join(f'{structure_name(name)} {share:.0%}' for name, share in now)
-        gone = ', '.join(structure_name(model.effects) for model in left)
-        return [
-            Reweighed(
-                window.number,
-                window.end,
-                now,
-                tuple(model.effects for model in left),
-                f'forecasts up to sample {window.end} weigh {said}'
-                + (f'; no longer carried: {gone}' if gone else '')
-                + (f'; {structure_name(before.effects)} made them worse' if worse else ''),
-                worse,
-                window.record.stamp_ns(len(window.record) - 1),
-            )
-        ]
-
-    def _compared(self, i: int) -> bool:
-        """Whether a structure of no weight stays, as a reference for the others."""
-        member = self._members[i]
-        return member.before and not member.model.effects
-
-    def _outdone(self, errors: Sequence[float], material: float) -> bool:
-        """Drop the leading structure if it makes forecasts worse; return whether it was dropped.
-
-        That is if they were worse than those of the best reference, by more than what matters, in
-        enough successive windows; the reference takes its place.
-        """
-        leading = self._members[0]
-        rivals = [
-            (error, i)
-            for i, (member, error) in enumerate(zip(self._members, errors, strict=True))
-            if i > 0 and member.before and np.isfinite(error)
-        ]
-        for member in self._members[1:]:
-            member.worse = 0
-        if not leading.model.effects or not rivals or not np.isfinite(errors[0]):
-            return False
-        least, best = min(rivals)
-        leading.worse = leading.worse + 1 if errors[0] > least + material**2 else 0
-        lasts = max(structures.WORSE, math.ceil(structures.WORSE_SECONDS / self.settings.hop))
-        if leading.worse < lasts:
-            return False
-        self._log_prior[best] = max(self._log_prior[0], self._log_prior[best])
-        self._evidence[best] = max(self._evidence[0], self._evidence[best])
-        self._log_prior[0] = -np.inf
-        return True
+        self._members.begin(proposal)
 
     def abandon(self, reason: str) -> list[Event]:
         """Give up the running job, whose process has died."""
@@ -574,24 +426,6 @@ class Estimator:
             self._begin(Proposal.of(passed))
         self._applied = len(due)
         return Proposal.of(due[-1])
-
-
-def _learned(member: _Member, found: WindowResult | WindowFit) -> list[Contradicted]:
-    """Keep the results of a structure's window; return alarms that it contradicts its prior."""
-    member.waited = 0
-    if found.failure:
-        return []
-    if found.archive is not None:
-        member.archive, member.epoch = found.archive, found.window.epoch
-    if found.frozen is not None:
-        member.frozen = replace(found.frozen, beside=())
-    return member.knowledge.learn(found.window, found.learned, found.conflict)
-
-
-def _box(model: ModelChoice) -> dict[str, tuple[float, float]]:
-    """Return the bounds of each parameter, in whatever order they come."""
-    pairs = zip(model.lower, model.upper, strict=True)
-    return dict(zip(model.names, pairs, strict=True))
 
 
 def _key(window: Window) -> tuple[int, int]:

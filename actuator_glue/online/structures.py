@@ -1,4 +1,4 @@
-"""Structures that are carried side by side, and how their weights move with their forecasts.
+"""Proposals of structures to carry side by side, and how their weights move with forecasts.
 
     log w_S = log p_S - c sum_n (1 - a) a^(age of n) (e_S,n^2 - min_R e_R,n^2) / m^2
 

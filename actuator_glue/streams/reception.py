@@ -16,7 +16,7 @@ from actuator_glue.records import Array
 from actuator_glue.streams.clock import HELD_UP, STEP, ClockMap
 from actuator_glue.streams.layout import TYPES, Layout, Rows
 from actuator_glue.streams.sequence import Run, Sequence
-from actuator_glue.streams.times import Jumps, Numbers
+from actuator_glue.streams.times import Jumps, NumbersByTime
 
 # What tells the order of samples: a counter, else their times, else that they arrive in order.
 Order: TypeAlias = Literal['counter', 'time', 'arrival']
@@ -85,7 +85,7 @@ class Reception:
             rate, modulus, restarts=not signed, shuffled=not in_order, counts=self.counts
         )
         self._rates = _Rates(rate, layout, self.order)
-        self._numbers = Numbers()
+        self._numbers = NumbersByTime()
         self._arrived = 0
         self._jumps = Jumps(rate)
         self._last_arrival = 0.0

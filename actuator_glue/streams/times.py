@@ -13,7 +13,7 @@ _FOLLOW = 0.05
 _JITTER = 0.1
 
 
-class Numbers:
+class NumbersByTime:
     """Numbers samples by their times where nothing else counts them.
 
     Times need not be multiples of the period: where they lie between them is followed, so that

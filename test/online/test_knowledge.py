@@ -252,7 +252,7 @@ def test_memory_is_bounded():
         estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
         while (job := estimator.next_job()) is not None:
             estimator.finish(run(job))
-            most = max(most, len(estimator._members[0].knowledge._learned))
+            most = max(most, len(estimator._members.leading.knowledge._learned))
     assert most <= 2 + SEQUENTIAL.window / SEQUENTIAL.hop
 
 

@@ -390,7 +390,7 @@ def weighing(*errors, settings=SETTINGS):
             window = result
     play, plain = Proposed(choose_model(('backlash',)), 0.98), Proposed(choose_model(), 0.02)
     estimator._begin(Proposal((play, plain), 5e-6))
-    told = [estimator._weigh(replace(window, errors=pair)) for pair in errors]
+    told = [estimator._members.weigh(replace(window, errors=pair)) for pair in errors]
     return estimator, told
 
 
@@ -450,7 +450,7 @@ def test_windows_in_quick_succession_leave_no_time_for_more_than_one_from_before
 def test_without_rivals_that_were_there_before_nothing_is_taken_out():
     """Who asks for one structure has it, whatever it forecasts."""
     estimator = Estimator(SETTINGS, Proposal((Proposed(choose_model(('backlash',))),)))
-    assert not estimator._outdone((1.0,), 1e-9)
+    assert not estimator._members._outdone((1.0,), 1e-9)
 
 
 @pytest.mark.parametrize('afresh', [False, True])
