@@ -10,7 +10,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
 
 _PLAIN, _BESIDE = 'Eq. (2)', ' + '
-Reason: TypeAlias = Literal['gap', 'stream', 'clock', 'setup', 'bad-input', 'model']
+Reason: TypeAlias = Literal['gap', 'stream', 'clock', 'setup', 'bad-input']
 
 
 @dataclass(frozen=True, slots=True, eq=False)
