@@ -1,10 +1,11 @@
 """Readings that nobody measured: they stand still, or run straight, where the piston must not.
 
-A converter that hangs, or a packet that is sent again, repeats one value exactly. A piston that
-play or friction holds still does not: what a model then misses is part of its whole residual, and
-a channel's grid holds it for one step at most. A reading that is never exceeded is an end of the
-channel's range: that is the transducer's, and stays. Missing samples that somebody filled in lie
-on a straight line, with none of the noise around them.
+A converter that hangs, or a packet that is sent again, repeats one value exactly, for longer than
+readings of that channel usually stand; where it ends, the reading catches up at once with what the
+piston did meanwhile. A piston that play or friction holds still does not: it starts from where it
+stood. A channel's grid holds a reading for one step at most, and one that is never exceeded is an
+end of the channel's range: that is the transducer's, and stays. Missing samples that somebody
+filled in lie on a straight line, with none of the noise around them and a kink at both ends.
 """
 
 from __future__ import annotations
@@ -17,11 +18,20 @@ from numpy.typing import NDArray
 from actuator_glue.records import Array, Record
 
 _REPEATS = 3  # equal readings at least
+_LONGER = 3.0  # times as long as readings of the channel usually stand
+_USUALLY = 0.95  # of them stand no longer
 _BEYOND = 8.0  # times the residual's robust size
 _DEPARTING = 3.0  # the same from a line, which no noise is
-_STEPS = 2.0  # of the channel's grid
+_STEPS = 4.0  # of the channel's grid: a piston that starts again moves by one
+_COARSE = 2.0  # steps of it that a channel usually bends by
+_FINE = 1e-6  # of a channel's range: what is finer nobody measures
+_APART = 0.5  # of what a model says: so much beside it catches up with it, or is its kink
+_DEAD = 0.25  # of all motion: no piston that is held misses so much until a record ends
+_TAIL = 0.01  # of a record: a shorter end is held where the channel was interpolated
 _STRAIGHT = 4  # samples on a line at least, between its ends
 _BENT = 0.02  # of the usual second difference: noise is as straight once in 10^8 samples
+_ROUNDED = 3e-7  # of a channel's size: single precision bends a line by so much
+_NOISY = 4.0  # times the usual second difference: a kink is known to so much
 
 
 @dataclass(frozen=True)
@@ -46,8 +56,10 @@ def lines(values: Array) -> Frozen:
     """
     bend = np.abs(np.diff(values, 2))
     usual = float(np.median(bend))
-    moves = (values[2:] != values[:-2]) & (usual > _STEPS * _grid(values))
-    first, last = _runs(moves & (bend <= _BENT * usual))
+    grid = _grid(values)
+    straight = min(_BENT * usual, 1.5 * grid + _ROUNDED * float(np.abs(values).max()))
+    moves = (values[2:] != values[:-2]) & (usual > _COARSE * grid)
+    first, last = _runs(moves & (bend <= straight))
     long = last - first >= _STRAIGHT - 1
     return Frozen(first[long] + 1, last[long] + 1)
 
@@ -59,7 +71,7 @@ def _runs(true: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
-    """Return those repeats in which a model's output moves beyond noise and grid.
+    """Return those repeats that a model's output leaves, and with which readings catch up after.
 
     Args:
         repeated: see `repeats`; one at least.
@@ -69,26 +81,51 @@ def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
     y, first, last = record.measured, repeated.first - 1, repeated.last
     edges = np.stack([first, last + 1], axis=1).ravel()
     edges = edges[edges < len(y)]
-    motion = np.maximum.reduceat(output, edges) - np.minimum.reduceat(output, edges)
-    far = motion[::2] > max(_BEYOND * _noise(y - output), _STEPS * _grid(y))
+    motion = (np.maximum.reduceat(output, edges) - np.minimum.reduceat(output, edges))[::2]
+    far = motion > max(_BEYOND * _noise(y - output), _STEPS * _grid(y), _FINE * np.ptp(y))
     far &= (y[last] > y.min()) & (y[last] < y.max())  # else it is at an end of its range
+    far &= last + 1 - first > _LONGER * _usual(y)
+    after = np.minimum(last + 1, len(y) - 1)
+    caught = (y - output)[after] - (y - output)[last]
+    thaws = np.abs(caught - (output[last] - output[first])) < _APART * motion
+    dead = (motion > _DEAD * np.ptp(output)) & (last - first > _TAIL * len(y))
+    far &= np.where(after > last, thaws, dead)
     return Frozen(repeated.first[far], last[far])
 
 
 def while_bending(lines: Frozen, record: Record, output: Array) -> Frozen:
-    """Return those lines from which a model's output departs beyond noise.
+    """Return those lines from which a model's output departs beyond noise, between two kinks.
 
     Args:
         lines: see `lines`; one at least.
         record: as it was sampled.
         output: of a model that was fitted, at the same times, (n,) [m].
     """
-    noise = _noise(record.measured - output)
-    ends = list(zip(lines.first - 1, lines.last + 2, strict=True))
-    own, bends = (np.array([_bend(c[a:b]) for a, b in ends]) for c in (record.measured, output))
+    y = record.measured
+    noise = max(_noise(y - output), _FINE * float(np.ptp(y)))
+    ends = lines.first - 1, lines.last + 1
+    pairs = list(zip(*ends, strict=True))
+    own, bends = (np.array([_bend(c[a : b + 1]) for a, b in pairs]) for c in (y, output))
     # Slow motion without noise is nearly straight, and so is its model.
     far = bends > np.maximum(_DEPARTING * noise, _BEYOND * own)
+    kinks, drawn = _kinks(y, *ends), _kinks(output, *ends)
+    noise = _NOISY * float(np.median(np.abs(np.diff(y, 2))))
+    far &= (np.abs(kinks - drawn) < _APART * np.abs(drawn) + noise).all(axis=0)
     return Frozen(lines.first[far], lines.last[far])
+
+
+def _kinks(values: Array, begin: NDArray[np.intp], end: NDArray[np.intp]) -> Array:
+    """Return how far values (n,) turn where lines between some of them begin and end, (2, c)."""
+    slope = (values[end] - values[begin]) / (end - begin)
+    before = values[begin] - values[np.maximum(begin - 1, 0)]
+    after = values[np.minimum(end + 1, len(values) - 1)] - values[end]
+    return np.stack([slope - before, after - slope])
+
+
+def _usual(values: Array) -> float:
+    """Return how many samples a reading of a channel (n,) usually stands."""
+    moved = np.flatnonzero(np.diff(values))
+    return float(np.quantile(np.diff(moved), _USUALLY)) if len(moved) > 1 else np.inf
 
 
 def _grid(values: Array) -> float:

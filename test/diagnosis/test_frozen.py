@@ -83,3 +83,51 @@ def test_a_channel_that_usually_runs_straight_has_no_gap(every: int, grid: float
     gap = record.measured.copy()
     gap[5000:5040] = np.linspace(gap[5000], gap[5040], 40, endpoint=False)
     assert len(lines(gap).first) == 1
+
+
+def slower(y: Array, way: str) -> Array:
+    """Return a channel that came from a slower recorder, every tenth sample or so."""
+    rng, n = np.random.default_rng(3), len(y)
+    at = np.arange(0, n - 12, 10)
+    if way == 'late':  # each reading is held until the next, which comes when it comes
+        at = np.maximum.accumulate(np.maximum(at + rng.integers(-4, 5, len(at)), 0))
+        return y[at][np.searchsorted(at, np.arange(n), side='right') - 1]
+    return np.interp(np.arange(n), at, y[at])  # behind the last one it is held
+
+
+@pytest.mark.parametrize('way', ['late', 'lines'])
+@pytest.mark.parametrize('grid', [0.0, 4e-6])
+def test_readings_that_usually_stand_are_not_frozen(way: str, grid: float) -> None:
+    """Nor is what is behind the last of them; one that stands ten times as long is."""
+    record, _ = machine(500.0, 4)
+    y = slower(record.measured, way)
+    y = np.round(y / grid) * grid if grid else y
+    _, notes, _ = despiked([replace(record, measured=y)], ['rest'])
+    assert not any('frozen' in n or 'filled' in n for n in notes)
+    y[6030:6150] = y[6030]
+    _, notes, _ = despiked([replace(record, measured=y)], ['rest'])
+    assert any('1 time while the piston must move' in n for n in notes)
+
+
+@pytest.mark.parametrize('rate', [100.0, 1000.0])
+@pytest.mark.parametrize(
+    'friction', [('coulomb-friction', 2000.0), ('stribeck-friction', 3e3, 1.5, 0.01)]
+)
+def test_a_piston_that_friction_holds_starts_where_it_stood(
+    rate: float, friction: tuple[str, float]
+) -> None:
+    """It sticks under slow ramps, while Eq. (2) goes on; a frozen channel jumps at its end."""
+    t = np.arange(int(30 * rate)) / rate
+    command = np.interp(
+        t, [1, 4, 6, 9, 12, 18, 20, 26], 5e-3 * np.array([0, 1, 1, -1, -1, 1, 1, 0])
+    )
+    bare = Record(command, np.zeros(len(t)), 1 / rate, stiffness=250e3)
+    name, *own = friction
+    x = Structure((name,)).simulate(np.array([*THETA, *own]), bare)
+    for grid in (1e-12, 1e-6):
+        y = np.round(x / grid) * grid
+        _, notes, _ = despiked([replace(bare, measured=y)], ['rest'])
+        assert not any('frozen' in n or 'filled' in n for n in notes)
+        y[int(14 * rate) : int(16 * rate)] = y[int(14 * rate)]
+        _, notes, _ = despiked([replace(bare, measured=y)], ['rest'])
+        assert any('frozen' in n for n in notes)
