@@ -54,6 +54,17 @@ def nearly(name: str) -> bool:
     return note_of(name) is not None or _meant(name) is not None or is_rate(name)
 
 
+def of_variable(name: str, value: str, *, words: bool) -> bool:
+    """Return whether a variable says one of `NOTES`, right or nearly, or a sample rate.
+
+    Numbers called `hold` or `actuator` are the laboratory's own, and a `stiffness` is that of its
+    model.
+    """
+    if words:
+        return _states(name, value)
+    return note_of(name) == 'stiffness_N_per_m' or is_rate(name)
+
+
 def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
     """Return what a file says besides, by the names of `NOTES`; other notes are left out.
 

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, GroupObject, TdmsWriter
+from scipy.io import savemat
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
@@ -231,3 +232,29 @@ def test_groups_that_differ_are_told(tmp_path: Path) -> None:
     assert (record.hold, record.stiffness) == ('zoh', 250e3)
     (line,) = told
     assert 'its groups have different hold (linear, zoh), and none is taken' in line
+
+
+def variables(path: Path, **said: object) -> Path:
+    """Write variables beside the columns, as MATLAB 5, MATLAB 7.3 or HDF5."""
+    if path.suffix == '.mat':
+        savemat(path, {**COLUMNS, **said})
+        return path
+    with h5py.File(path, 'w') as file:
+        for name, value in {**COLUMNS, **said}.items():
+            file[name] = value
+    return path
+
+
+@pytest.mark.parametrize('name', ['a.mat', 'a.h5'])
+def test_variables_are_notes_whatever_their_capitals(tmp_path: Path, name: str) -> None:
+    """`Hold` was passed over without a word: zoh, half a sample of delay that is none."""
+    path = tmp_path / name
+    said = {'Hold': 'linear', 'STIFFNESS_N_per_m': 250e3, 'Actuator': 'mts 3'}
+    record = read(variables(path, **said))
+    assert (record.hold, record.stiffness, record.actuator) == ('linear', 250e3, 'mts 3')
+    with pytest.raises(InputError, match=r'`hold = VALUE`, which is zoh or linear'):
+        read(variables(path, hold_type='linear'))
+    # The hold of a load, the test's own words, and numbers of the laboratory's model.
+    own = {'Hold': '5 s', 'hold_mode': 'displacement', 'stiffness': 3.0, 'HOLD_TIME': 5.0}
+    record = read(variables(path, **own))
+    assert (record.hold, record.stiffness) == ('zoh', None)

@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import NOTES, nearly, of_groups
+from actuator_glue.io.file_notes import nearly, of_groups, of_variable
 from actuator_glue.io.formats import (
     A_REMARK,
     MOST_COLUMNS,
@@ -25,7 +25,6 @@ from actuator_glue.io.formats import (
     matrix_columns,
     reading,
 )
-from actuator_glue.io.noted_rate import is_rate
 from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.waveforms import (
     PROPERTIES,
@@ -177,13 +176,14 @@ class _Tree:
 
     def _note(self, dataset: Any, shown: str) -> None:
         label = shown.replace('/', '.').rpartition('.')[2]
-        # Numbers called `hold` or `actuator` are the laboratory's own.
         words = _is_text(dataset) or dataset.dtype.kind in 'SUO'
-        number = label == 'stiffness_N_per_m' or is_rate(label)
-        if (words and label in NOTES) or (number and dataset.size == 1):
-            self.notes[label] = _text(dataset)
+        if not (words or dataset.size == 1):
+            return
+        said = _text(dataset)
+        if of_variable(label, said, words=words):
+            self.notes[label] = said
         if _is_text(dataset):
-            self.texts[shown] = _text(dataset)
+            self.texts[shown] = said
 
     def _take_structs(self, dataset: Any, shown: str, depth: int) -> None:
         """Take a field of an array of structs: a reference for each, in MATLAB's order."""

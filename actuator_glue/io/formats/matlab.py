@@ -13,7 +13,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.file_notes import NOTES
+from actuator_glue.io.file_notes import of_variable
 from actuator_glue.io.formats import (
     A_REMARK,
     Column,
@@ -26,7 +26,6 @@ from actuator_glue.io.formats import (
 from actuator_glue.io.formats.hdf5 import has_objects, is_hdf5, named_by_structs, read_tree
 from actuator_glue.io.matlab_elements import check_elements
 from actuator_glue.io.matlab_objects import check_clocks, read_objects
-from actuator_glue.io.noted_rate import is_rate
 from actuator_glue.io.signature import is_text, refuse_foreign
 from actuator_glue.io.units import bare
 from actuator_glue.records import Array
@@ -88,11 +87,11 @@ def _plain(content: dict[str, Any]) -> FileTable:
         columns += found
         places += [(name, i) for i in range(len(found))]
     named = ((name.rpartition('.')[2], text) for name, text in texts.items())
-    notes = {name: text for name, text in named if name in NOTES or is_rate(name)}
+    notes = {name: text for name, text in named if of_variable(name, text, words=True)}
     for name, array in arrays.items():
         label = name.rpartition('.')[2]
-        if (label == 'stiffness_N_per_m' or is_rate(label)) and array.size == 1:
-            notes[label] = repr(float(array.flat[0]))
+        if array.size == 1 and of_variable(label, said := repr(float(array.flat[0])), words=False):
+            notes[label] = said
 
     def values(wanted: list[int]) -> list[Array]:
         chosen = [places[at] for at in wanted]
