@@ -280,6 +280,9 @@ def test_thousands_are_never_taken_for_fractions(tmp_path: Path, decimal: str) -
     ]
     with pytest.raises(InputError, match=r'force .* line 2: .2.461'):
         read(table(tmp_path / 'a.csv', rows, by=';'))
+    both = [[*row[:3], f'{force}{decimal}5'] for row, force in zip(rows, grouped, strict=True)]
+    with pytest.raises(InputError, match=r'is decimal: export it without thousands'):
+        read(table(tmp_path / 'a.csv', both, by=';'))
     whole = [
         [str(i), row[1].replace('.', ''), row[2].replace('.', ''), force]
         for i, (row, force) in enumerate(zip(ROWS, grouped, strict=True))

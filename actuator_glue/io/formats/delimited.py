@@ -638,8 +638,9 @@ def entry_at(path: Path, head: TextHead, row: int, position: int) -> str:
         number, line = next(islice(_rows(file, head), row, None))
     entries = [*fields_of(line, head.delimiter), *[''] * head.width]
     said = f'line {number}: {entries[position][:_SHOWN]!r}'
-    if head.decimal == ',' and is_number(entries[position]):
-        return f'{said} (a point where the comma is decimal: export it without thousands)'
+    other, decimal = ('.', 'comma') if head.decimal == ',' else (',', 'point')
+    if other in entries[position] and is_number(entries[position].replace(other, '')):
+        return f'{said} ({other!r} where the {decimal} is decimal: export it without thousands)'
     return said
 
 
