@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Input, number, only_with, stiffness
-from actuator_glue.cli._output import note
+from actuator_glue.cli._output import few, note
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
 
@@ -89,14 +89,20 @@ def load(args: argparse.Namespace) -> list[Record]:
     from actuator_glue.io.load import load_records
     from actuator_glue.motion import speak
 
-    found = load_records(
-        args.records,
-        stiffness=args.stiffness,
-        channels=args.channels,
-        hold=args.hold,
-        resample=resampling(args),
-        gap=note if args.split else None,
-        warn=note,
-    )
+    gaps: list[str] = []
+    try:
+        found = load_records(
+            args.records,
+            stiffness=args.stiffness,
+            channels=args.channels,
+            hold=args.hold,
+            resample=resampling(args),
+            gap=gaps.append if args.split else None,
+            warn=note,
+        )
+    finally:
+        shown, more = few(gaps, 'gaps', args.records[0])
+        for line in (*shown, *more):
+            note(line)
     speak(found[0].motion)
     return found

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.cli._output import add_json, note, say, table
+from actuator_glue.cli._output import add_json, few, note, say, table
 from actuator_glue.cli._records import add_records, resampling
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -61,23 +61,30 @@ def run(args: argparse.Namespace) -> int:
                 hold=args.hold,
                 resample=resampling(args),
                 note=lambda _: None,
-                gap=note if args.split else content['damage'].append,
+                gap=content['warnings' if args.split else 'damage'].append,
                 warn=content['warnings'].append,
             )
         except InputError as error:
             content['damage'].append(str(error))
-        for line in content['damage']:
-            print(f'actuator-glue: {line}', file=sys.stderr)
-            code = 2
-        for line in content['warnings']:
-            note(line)
-        for record in records:
+        code = 2 if content['damage'] else code
+        for kind, tell in (('damage', _damage), ('warnings', note)):
+            lines, more = few(content[kind], 'of such lines', path)
+            for line in (*lines, *more):
+                tell(line)
+        shown, more = few(records, 'records', path)
+        for record in shown:
             with speaking(record.motion):
                 _show(record, args)
+        for line in more:
+            say(line, args)
         content['records'] = [_describe(r) for r in records]
         files.append(content)
     write_json({'schema': 'actuator_glue.info/1', 'files': files}, args.json)
     return code
+
+
+def _damage(line: str) -> None:
+    print(f'actuator-glue: {line}', file=sys.stderr)
 
 
 def _stiffnesses(args: argparse.Namespace) -> list[list[Stiffness] | None]:

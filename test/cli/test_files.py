@@ -159,6 +159,34 @@ def test_a_gap_is_refused_unless_it_may_split(run, tmp_path: Path, short_bag: Pa
     assert sorted(p.name for p in tmp_path.glob('*.csv')) == ['x_1.csv', 'x_2.csv']
 
 
+def test_of_very_many_gaps_a_few_are_told_and_where_the_rest_is(
+    run, tmp_path: Path, short_bag: Path
+) -> None:
+    """A line each hid what else was said; JSON has all."""
+    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_writer import BagWriter
+
+    (record,) = load_records(short_bag)
+    bag = tmp_path / 'many gaps'
+    with BagWriter(bag) as writer:
+        for first in range(0, 800, 10):
+            write_record(writer, record.slice(first, first + 8))
+    where = f"79 in all: `actuator-glue info '{bag}' --split --json OUT` has them"
+    for options in ((), ('--split',)):
+        shown = run('info', bag, *options, '--json', '-')
+        assert shown.code == (0 if options else 2)
+        assert shown.err.count(' are missing before sample ') == 20
+        assert f'59 more of such lines, {where}' in shown.err
+        assert '60 more records, 80 in all' in shown.err
+        (content,) = shown.json['files']
+        assert len(content['warnings' if options else 'damage']) == 79
+        assert len(content['records']) == 80
+    done = run('convert', bag, tmp_path / 'whole', '--split')
+    assert done.code == 0
+    assert done.err.count(' are missing before sample ') == 20
+    assert f'59 more gaps, {where}' in done.err
+
+
 def test_pictures_of_records(run, tmp_path: Path, short_bag: Path, problem_r: Path) -> None:
     """One picture per record; a bag without posteriors says how to get them."""
     done = run('plot', short_bag, problem_r / 'r_1.csv', '--out', tmp_path / 'pics')
