@@ -11,6 +11,7 @@ from actuator_glue.hygiene import frozen
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.frozen import Frozen
 from actuator_glue.hygiene.impulses import NONE, Impulses, Motion, beyond, find, in_command
+from actuator_glue.hygiene.unlike_rest import step
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.inference.least_squares.fit import base_fit, fit
@@ -103,7 +104,7 @@ def _found(output: Array, measured: Array, period: float, moving: slice) -> Impu
         far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, measured)))
         return Motion((speed[moving], far[moving]), _phase(output, measured)[moving])
 
-    return find((measured - output)[moving], motion, period)
+    return find((measured - output)[moving], motion, period, step(measured))
 
 
 def _less(channel: Array, found: Impulses, share: float) -> Array:

@@ -134,7 +134,9 @@ class Motion(NamedTuple):
     phase: Array | None = None
 
 
-def find(residual: Array, motion: Callable[[], Motion], period: float) -> Impulses:
+def find(
+    residual: Array, motion: Callable[[], Motion], period: float, step: float = 0.0
+) -> Impulses:
     """Return the impulses of a residual.
 
     There are none where they are too many to be accidents, or come with the motion.
@@ -143,13 +145,15 @@ def find(residual: Array, motion: Callable[[], Motion], period: float) -> Impuls
         residual: of a model that was fitted, (n,) [m].
         motion: returns the motion at the same samples; called only where something stands out.
         period: time between samples [s].
+        step: of the channel's grid, by whose rounding a reading is off at least [m].
     """
     if len(residual) < 40 * _REACH:
         return NONE
     taps = _filter(residual)[::-1]  # `convolve` reverses them
     error = np.asarray(np.convolve(residual, taps, 'same'), dtype=np.float64)
     error[:_REACH] = error[-_REACH:] = 0.0
-    noise, whole = noise_of(error, period), noise_of(residual, period)
+    rounding = step / math.sqrt(12.0)
+    noise, whole = (np.maximum(noise_of(e, period), rounding) for e in (error, residual))
     suspect = np.flatnonzero(np.abs(error) > _BEYOND * noise)
     if not len(suspect) or len(suspect) > 2 * _REACH * _MOST * len(residual):
         return NONE

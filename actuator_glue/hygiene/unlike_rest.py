@@ -9,7 +9,7 @@ import numpy as np
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.clean import initial_state, rest_samples
 from actuator_glue.hygiene.rest import noise_at_rest
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 # Times the noise at rest that no transducer, oil or stand adds in motion; and the share of the
 # spread measured below which nobody minds.
@@ -17,10 +17,10 @@ _TIMES, _SHARE = 10.0, 0.01
 _ROUNDED = 1e-9  # of the range: the same reading
 
 
-def step(record: Record) -> float:
-    """Return the least step between two readings of the measured channel [m]."""
-    apart = np.diff(np.unique(record.measured))
-    apart = apart[apart > _ROUNDED * float(np.ptp(record.measured))]
+def step(readings: Array) -> float:
+    """Return the least step between two readings of a channel (n,), in its unit."""
+    apart = np.diff(np.unique(readings))
+    apart = apart[apart > _ROUNDED * float(np.ptp(readings))]
     return float(apart.min()) if apart.size else 0.0
 
 
@@ -37,7 +37,7 @@ def unlike_rest(records: Sequence[Record], moving: float) -> tuple[str, ...]:
         if still is None or moving < _SHARE * float(record.measured.std()):
             continue
         # A channel that reads the same at rest may be off by up to half of its step.
-        known = max(still, step(record) / np.sqrt(12.0))
+        known = max(still, step(record.measured) / np.sqrt(12.0))
         if moving > _TIMES * known:
             out.append(
                 f'{where(record, i + 1)}: {1e6 * moving:.3g} um are taken for noise, and the '

@@ -230,3 +230,17 @@ def test_what_an_effect_makes_is_not_left_out_of_its_size(rng_seed: int) -> None
         for record, mended in zip(records, clean.fit.records, strict=True):
             np.testing.assert_allclose(mended.measured, record.measured, rtol=0.0, atol=1e-15)
     assert shown
+
+
+def test_one_step_of_a_coarse_channel_at_rest_is_rounding() -> None:
+    """With pauses between, readings flicker by a step; a reading that is off by twenty is off."""
+    command = 8e-3 * np.sin(4.0 * np.pi * T) * (np.floor(T / 2.0) % 2 == 1)
+    _, x = healthy(3, command)
+    noise, grid = 1e-6 * np.random.default_rng(3).standard_normal(len(T)), 4e-6
+    y = np.round((x + noise) / grid) * grid
+    record = Record(command, y, 1 / RATE, stiffness=250e3)
+    assert despiked([record], ['rest'])[1] == []
+    y[[2000, 3000]] += 20.0 * grid
+    _, notes, _ = despiked([replace(record, measured=y)], ['rest'])
+    assert len(notes) == 1
+    assert '2 impulses (2 of 6144 samples, up to ' in notes[0]
