@@ -11,7 +11,7 @@ from actuator_glue.hygiene import frozen
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.frozen import Frozen
 from actuator_glue.hygiene.impulses import NONE, Impulses, Motion, beyond, find, in_command
-from actuator_glue.hygiene.unlike_rest import step
+from actuator_glue.hygiene.rest import step
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.inference.least_squares.fit import base_fit, fit

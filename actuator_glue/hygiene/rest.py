@@ -1,4 +1,4 @@
-"""Noise of a channel at rest, beside what is taken for noise in motion."""
+"""Noise and step of a channel at rest, beside what is taken for noise in motion."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 from actuator_glue.hygiene.checks import where
 from actuator_glue.inference.least_squares.data import SETTLE
 from actuator_glue.model.exact import Initial
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 _SAMPLES = 100  # at least, at rest
 _SURELY = 0.9  # of the rest: where it ends is not known to the sample
 _APART = 1.5  # times as large is another noise
+_ROUNDED = 1e-9  # of the range: the same reading
 
 
 def noise_at_rest(record: Record, samples: int, initial: Initial = 'rest') -> float | None:
@@ -34,6 +35,13 @@ def noise_at_rest(record: Record, samples: int, initial: Initial = 'rest') -> fl
     y = y - y.mean()
     y = y - at * (at @ y) / (at @ at)
     return float(np.sqrt(y @ y / (samples - 2)))
+
+
+def step(readings: Array) -> float:
+    """Return the least step between two readings of a channel (n,), in its unit."""
+    apart = np.diff(np.unique(readings))
+    apart = apart[apart > _ROUNDED * float(np.ptp(readings))]
+    return float(apart.min()) if apart.size else 0.0
 
 
 def compared(

@@ -8,20 +8,12 @@ import numpy as np
 
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.clean import initial_state, rest_samples
-from actuator_glue.hygiene.rest import noise_at_rest
-from actuator_glue.records import Array, Record
+from actuator_glue.hygiene.rest import noise_at_rest, step
+from actuator_glue.records import Record
 
 # Times the noise at rest that no transducer, oil or stand adds in motion; and the share of the
 # spread measured below which nobody minds.
 _TIMES, _SHARE = 10.0, 0.01
-_ROUNDED = 1e-9  # of the range: the same reading
-
-
-def step(readings: Array) -> float:
-    """Return the least step between two readings of a channel (n,), in its unit."""
-    apart = np.diff(np.unique(readings))
-    apart = apart[apart > _ROUNDED * float(np.ptp(readings))]
-    return float(apart.min()) if apart.size else 0.0
 
 
 def unlike_rest(records: Sequence[Record], moving: float) -> tuple[str, ...]:
