@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from actuator_glue import robust
 from actuator_glue.hygiene import glitches, slow_channel
 from actuator_glue.hygiene.checks import beside_stated, check, where
 from actuator_glue.hygiene.repeats import refuse_repeats
@@ -32,7 +33,7 @@ def rest_samples(record: Record) -> int:
     head = record.command[: max(2, round(_HEAD / record.period))]
     width = max(1, round(_SMOOTH / record.period))
     centre = float(np.median(head))
-    noise = 1.4826 * float(np.median(np.abs(head - centre))) / np.sqrt(width)
+    noise = robust.deviation(head, centre) / np.sqrt(width)
     off = np.abs(scipy.ndimage.uniform_filter1d(record.command, width, mode='nearest') - centre)
     moving = off > max(_MOVED * float(off.max()), 6.0 * noise)
     return int(np.argmax(moving)) if noise < _MOVED * float(off.max()) else 0

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue import robust
 from actuator_glue.records import Array, Record
 
 _REPEATS = 3  # equal readings at least
@@ -134,7 +135,7 @@ def _grid(values: Array) -> float:
 
 
 def _noise(error: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(error - np.median(error))))
+    return robust.deviation(error, float(np.median(error)))
 
 
 def _bend(values: Array) -> float:

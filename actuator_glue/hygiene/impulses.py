@@ -17,6 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from actuator_glue import robust
 from actuator_glue.records import Array
 
 _REACH = 6  # samples to either side
@@ -65,7 +66,7 @@ def _filter(error: Array) -> Array:
         weights = scipy.linalg.lstsq(rows[keep], error[at[keep]], cond=1e-12)[0]
         off = np.abs(error[at] - rows @ weights)
         largest = np.maximum(off, np.abs(rows).max(axis=1))
-        keep = largest <= _BEYOND * 1.4826 * float(np.median(np.abs(error)))
+        keep = largest <= _BEYOND * robust.deviation(error)
         if keep.sum() < 10 * _REACH:
             break
     return np.insert(-weights, _REACH, 1.0)
@@ -79,7 +80,7 @@ def noise_of(error: Array, period: float) -> Array:
     levels = np.array([np.median(np.abs(e)) for e in np.split(np.abs(error), edges[1:-1])])
     # Motion that begins is no impulse; a channel at rest on its grid has no noise to be beyond.
     levels = np.maximum(scipy.ndimage.maximum_filter1d(levels, 3), np.median(np.abs(error)))
-    return np.repeat(1.4826 * levels, np.diff(edges))
+    return np.repeat(robust.NORMAL * levels, np.diff(edges))
 
 
 def beyond(residual: Array, period: float) -> NDArray[np.bool_]:
@@ -206,7 +207,7 @@ def in_command(command: Array, found: Impulses) -> float:
     if not len(found.samples):
         return 0.0
     error = np.asarray(np.convolve(command, TAPS, 'same'), dtype=np.float64)
-    noise = 1.4826 * float(np.median(np.abs(error)))
+    noise = robust.deviation(error)
     # Impulses next to each other also enter each other's polynomials.
     off = np.zeros(len(command))
     off[found.samples] = found.sizes

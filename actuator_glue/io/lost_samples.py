@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from actuator_glue import robust
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import rounding
 from actuator_glue.records import Array
@@ -30,7 +31,6 @@ _PASSES = 12
 _STEPS = 2000  # that are looked at, the largest
 _ROUNDED = 1.02  # of a rounding step
 _BLOCK = 100  # stamps of which the earliest and the latest are looked at
-_ROUGH = 1.4826  # from the median deviation to a standard one
 
 
 def refuse_lost(time: Array, even: Array, where: str) -> None:
@@ -51,7 +51,7 @@ def refuse_lost(time: Array, even: Array, where: str) -> None:
     # A stamp that came late holds up a few behind it; what is lost moves all of them.
     off = scipy.ndimage.median_filter(off, _LATE, mode='nearest')
     usual = np.sort(np.abs(np.diff(off)))[: -max(2, count // _FEW)]  # without hold-ups
-    spreads = _ROUGH * float(np.median(np.abs(rough))), float(np.sqrt(np.mean(usual**2)))
+    spreads = robust.deviation(rough), float(np.sqrt(np.mean(usual**2)))
     jitter = max(spreads) / np.sqrt(2.0)
     sharp = max(_SHARP, int(np.ceil(4.0 * (_SURE * jitter / (_LOST * period)) ** 2)))
     if rounding(time) > _COARSE * period:
@@ -102,7 +102,7 @@ def _sharp_steps(off: Array, size: int, least: float, jitter: float) -> list[int
     before, behind = np.minimum(at, size), np.minimum(len(off) - at, size)
     step = (sums[at + behind] - sums[at]) / behind - (sums[at] - sums[at - before]) / before
     # Stamps that wander, as of a log written in bursts, have many such steps.
-    wander = _ROUGH * float(np.median(np.abs(step - np.median(step))))
+    wander = robust.deviation(step, float(np.median(step)))
     spread = jitter * np.sqrt(1.0 / before + 1.0 / behind)
     beyond = np.abs(step) / np.maximum(least, _SURE * np.maximum(spread, wander))
     found, _ = scipy.signal.find_peaks(np.pad(beyond, 1), height=1.0, distance=size)

@@ -17,8 +17,7 @@ from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.records import Array
-
-_NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation
+from actuator_glue.robust import NORMAL
 
 
 def open_form(refits: Refits, final: Trial, left: float, space: Space, scorer: Scorer) -> Array:
@@ -56,7 +55,7 @@ def spread(refits: Refits, final: Trial, left: float, space: Space) -> Array:
         if structure.effects != final.effects:
             for i in shared:
                 off[i].append(float(moved[i]))
-    return np.array([_NORMAL * float(np.median(rows)) if rows else 0.0 for rows in off])
+    return np.array([NORMAL * float(np.median(rows)) if rows else 0.0 for rows in off])
 
 
 def widened(draws: Array, size: Array, space: Space, rng: np.random.Generator) -> Array:
