@@ -12,6 +12,9 @@ from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import beside_stated, check
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.suspicions import suspicions
+from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.model.stream import Stream
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
 T = np.arange(0, 20, 1 / 256)
@@ -139,6 +142,23 @@ def test_a_force_that_says_nothing_stops_nobody() -> None:
     check(replace(pushed(250e3), force=np.full(len(T), 150.0)))
     noise = 1e3 * np.random.default_rng(2).standard_normal(len(T))
     check(replace(GOOD, stiffness=250e3, force=noise))
+
+
+@pytest.mark.parametrize(('effect', 'stiffness'), [('coulomb-friction', 0.0), ('', 1e5)])
+def test_friction_between_two_levels_is_no_specimen(effect: str, stiffness: float) -> None:
+    """It holds the piston as one would; a specimen that is not stated is refused."""
+    rng = np.random.default_rng(6)
+    u = 2e-3 * np.sign(np.sin(np.pi * T))
+    model = Structure([effect] if effect else [])
+    theta = [*TABLE_2, 300.0] if effect else TABLE_2
+    y, force = Stream(model, theta, stiffness=stiffness, period=1 / 256).step(u)
+    y = y + 2e-6 * rng.standard_normal(len(u))
+    record = Record(u, y, 1 / 256, stiffness=0.0, force=force + 10.0 * rng.standard_normal(len(u)))
+    if effect:
+        check(record)
+    else:
+        with pytest.raises(InputError, match=r'force over displacement is 1e\+05 N/m'):
+            check(record)
 
 
 def test_a_specimen_that_no_force_shows_is_told() -> None:
