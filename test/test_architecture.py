@@ -33,6 +33,7 @@ BOTTOM = {
     'even_times',
     'jit',
     'normal',
+    'robust',
     'json_value',
 }
 CORE = BOTTOM | {'model', 'inference'}
@@ -64,6 +65,7 @@ ARROWS = {
     'velocity_command': set(),
     'jit': set(),
     'normal': {'jit'},
+    'robust': {'records'},
     'json_value': set(),
     'optional_library': {'errors'},
     'arguments': {'errors', 'given'},
@@ -89,6 +91,7 @@ ARROWS = {
         'si',
         'even_times',
         'errors',
+        'robust',
         'json_value',
         'interfaces',
         'hybrid',
@@ -137,6 +140,7 @@ PURE = (
     'si',
     'even_times',
     'normal',
+    'robust',
     'json_value',
     'plain_yaml',
     'model',

@@ -265,8 +265,9 @@ class DiagnoserNode(WorkingNode):
         self._ended = outcome, self._goal
         self._request = self._goal = None
         self._take(outcome.concluded)
-        if self._ended is not None:  # nothing is to be carried
-            self._finish(*self._ended)
+        ended, self._ended = self._ended, None
+        if ended is not None:  # nothing is to be carried
+            self._finish(*ended)
 
     def _carry(self, proposal: Proposal) -> None:
         """Have the estimator carry other structures; the diagnosis ends with its answer."""

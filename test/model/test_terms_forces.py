@@ -102,6 +102,17 @@ def test_neighbours_do_not_matter(rng_seed: int) -> None:
         assert np.array_equal(moved(record, Structure((SLIPS,)), forces[i], ways[i]), together[i])
 
 
+def test_neighbours_do_not_matter_beside_a_specimen_that_yields(rng_seed: int) -> None:
+    """Its state is sought by the same Newton steps; it was refined with those of neighbours."""
+    rng = np.random.default_rng(rng_seed)
+    record, structure = sweeping(250e3), Structure(('specimen-yield', SLIPS))
+    sizes = np.column_stack([rng.uniform(1.0, 1000.0, 40), np.geomspace(1e-6, 1e-4, 40)])
+    table = np.column_stack([np.tile([*THETA, 0.1, 1e-3, 2.0], (40, 1)), sizes])
+    together = structure.simulate(table, record)
+    for i in rng.integers(0, 40, 3):
+        assert np.array_equal(structure.simulate(table[i], record), together[i])
+
+
 def test_blocks_are_the_whole(rng_seed: int) -> None:
     """A stream remembers from block to block, and its force is what the piston works against."""
     rng = np.random.default_rng(rng_seed)

@@ -182,10 +182,11 @@ def test_an_answer_that_is_lost_does_not_hold_up_the_diagnoser(node, probe, monk
     executor.add_node(node)
     while not node._model_client.service_is_ready():
         executor.spin_once(0.1)
-    node._told = outcome = diagnoser_worker.Outcome(diagnosis=SimpleNamespace())
+    outcome = diagnoser_worker.Outcome(diagnosis=SimpleNamespace())
+    node._ended = outcome, None
     node._carry(SimpleNamespace())
-    assert node._swap is not None
-    while node._swap is not None:
+    assert node._swaps
+    while node._swaps:
         executor.spin_once(0.1)
     assert not outcome.applied
     (told,) = node.health.message(time.monotonic(), Time(), 'active').status

@@ -117,8 +117,10 @@ def _search(
     for _ in range(balance.MOST if terms else 3 if falls else 2):
         if yields:
             for n in range(r.LANES):
-                moved = specimen_gap.passed(w, n, w[r.IN_DX + n], True)
-                specimen_yield.halfway(w, n, moved)
+                # A lane that has settled is left as it is, whatever its neighbours need.
+                if not terms or w[r.IN_LOW + n] < w[r.IN_HIGH + n]:
+                    moved = specimen_gap.passed(w, n, w[r.IN_DX + n], True)
+                    specimen_yield.halfway(w, n, moved)
         if terms:
             stage.force(w, g, parts, rate, yields)
         for n in range(r.LANES):
