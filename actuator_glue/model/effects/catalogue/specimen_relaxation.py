@@ -21,6 +21,7 @@ EFFECT = replace(
         source='Christensen 1982 (standard linear solid)',
         check=False,
     ),
+    reserved=True,
     meaning='the specimen is viscoelastic: a part of its force relaxes when motion stops',
     remedy='nothing at the actuator: declare it with --effect, or calibrate without it',
 )

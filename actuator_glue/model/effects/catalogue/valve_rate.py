@@ -30,6 +30,7 @@ EFFECT = replace(
         source='Merritt 1967; Jelali & Kroll 2003',
         check=False,
     ),
+    reserved=True,
     meaning='the spool cannot move faster: its pilot stage gives no more flow',
     remedy='command smaller or slower motion, raise the pilot pressure, or take a faster valve',
 )

@@ -16,6 +16,7 @@ EFFECT = replace(
         source='Merritt 1967',
         check=False,
     ),
+    reserved=True,
     meaning='the spool is narrower than its ports: near its centre the flow gain doubles',
     remedy='have the edges of the spool checked for wear; a matched spool and sleeve',
 )
