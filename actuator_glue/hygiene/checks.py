@@ -184,13 +184,15 @@ def _rubs(record: Record) -> bool:
     for i, now in enumerate(x.tolist()):
         kept = min(max(kept, now - way), now + way)
         turned[i] = now - kept
+    rubbed = _left(force, [turned - turned.mean(), acceleration])
+    return rubbed < _left(force, [x, acceleration])
 
-    def left(column: Array) -> float:
-        basis = np.column_stack([column - column.mean(), acceleration])
-        weights, *_ = np.linalg.lstsq(basis, force, rcond=None)
-        return float(np.sum((force - basis @ weights) ** 2))
 
-    return left(turned) < left(x)
+def _left(force: Array, columns: Sequence[Array]) -> float:
+    """Return the sum of squares of a force (n,) that columns of the motion leave."""
+    basis = np.column_stack(columns)
+    weights, *_ = np.linalg.lstsq(basis, force, rcond=None)
+    return float(np.sum((force - basis @ weights) ** 2))
 
 
 def _resists(record: Record) -> None:
@@ -248,13 +250,8 @@ def _is_one(record: Record) -> bool:
     # A gap and hardening bend the curve; friction and yield turn with the motion.
     turning = np.tanh(velocity / _TURNS)
     bent = [x**2, x**3, np.abs(x) * x, turning, turning * np.abs(x), turning * x**2]
-
-    def left(columns: list[Array]) -> float:
-        basis = np.column_stack(columns)
-        weights, *_ = np.linalg.lstsq(basis, force, rcond=None)
-        return float(np.sum((force - basis @ weights) ** 2)) / float(force @ force)
-
-    one, other = left(straight), left([*straight, *bent])
+    whole = float(force @ force)
+    one, other = (_left(force, c) / whole for c in (straight, [*straight, *bent]))
     by_chance = _SURE * len(bent) * other / max(len(x) - len(straight) - len(bent), 1)
     return one <= 1.0 - _ONE and one - other <= _BENT + by_chance
 

@@ -79,7 +79,8 @@ def build(seed: int, effect: str = '') -> Case:
     stiffness = tuple(stiff * float(k) for k in rng.choice(SHARES, 3))
     known = [n for n in CATALOGUE.searched() if CATALOGUE[n].variance is None and n != 'hum']
     drawn = str(rng.choice(known)) if seed % 3 else ''
-    names = tuple(filter(None, (effect or drawn,)))
+    name = effect or drawn
+    names = (name,) if name else ()
     inputs = [amplitude * command(rng, rate, duration, last) for _ in stiffness]
     still = [Record(u, u, 1.0 / rate, k) for u, k in zip(inputs, stiffness, strict=True)]
 

@@ -6,7 +6,7 @@ depends on it d(value)/d(dx) is computed. What holds during a test is computed o
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -48,7 +48,6 @@ _SIGNALS: Final[dict[str, Dual]] = {
 # long 0.04, a quarter 0.01. Where the flow bounds the error, so that it bends within the step, it
 # lost 9 um of 500 um; in steps a quarter as long 0.1.
 _TURNING: Final = 2
-_BENDS: Final = ('clip', 'min', 'max', 'dead', 'abs', 'sign')
 _BENDING: Final = 4
 # Signals written only if an instruction of some part reads them; those a part changes always are.
 _NEEDS: Final = (
@@ -67,7 +66,8 @@ _LEAST: Final = -0.5
 # d/d(dx) of the control error before any effect on it: the mean of the step.
 _E_SLOPE: Final = -0.5
 # Functions with a kink.
-_KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt', 'play'}
+_CORNERS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead'}
+_KINKS: Final = _CORNERS | {'sqrt', 'play'}
 _HOLDS: Final = dict(zip((*BASE, 'k'), range(m.BETA_1, m.K + 1), strict=True))
 
 
@@ -164,9 +164,9 @@ def compiled(effects: Iterable[Written]) -> Program:
     return replace(builder.program(), shorter=max(map(_shorter, valves), default=1))
 
 
-def _shorter(words: Container[str]) -> int:
+def _shorter(words: set[str]) -> int:
     """How many times shorter sub-steps must be for a valve with these words, command held."""
-    if 'q' in words and any(bends in words for bends in _BENDS):
+    if 'q' in words and words & _CORNERS:
         return _BENDING
     return _TURNING if 'play' in words else 1
 
