@@ -40,10 +40,7 @@ def term(
     group: str = '',
     signature: str = '',
     source: str = '',
-    meaning: str = '',
-    remedy: str = '',
     searched: bool = True,
-    reserved: bool = False,
     check: bool = True,
 ) -> Effect:
     """Return the entry of an effect written as `place: symbol = expression`.
@@ -55,10 +52,7 @@ def term(
         group: effects that leave nearly the same trace; its own name if empty.
         signature: what it leaves in the residual.
         source: literature.
-        meaning: what it is to a mechanic.
-        remedy: what to check or to do about it.
         searched: whether the diagnosis tries it.
-        reserved: it is tried only where all others leave material structure.
         check: try the expression at once; the catalogue's own are tried by tests.
 
     Raises:
@@ -78,13 +72,10 @@ def term(
             group=group or name,
             signature=signature or 'none described',
             source=source or 'an expression of the user',
-            meaning=meaning,
-            remedy=remedy,
             starts=_Starts(name, equation, parameters),
             expression=found,
             output=_Sensor(name, equation, parameters) if found.place == 'sensor' else None,
             searched=searched,
-            reserved=reserved,
         )
         if check:
             _check_neutral(effect)
