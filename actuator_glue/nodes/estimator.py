@@ -288,6 +288,7 @@ class EstimatorNode(WorkingNode):
             record = job.window.record
             number, index = job.window.number, record.first_index
             stamp, actuator = record.start_ns, record.actuator
+            self.get_logger().info(f'{actuator}, window {number} on: {proposal.described()}')
         fields = conversion.estimator_setup(self.settings, proposal, number, index, self._carried)
         publish(self._out[topics.ESTIMATOR_SETUP], conversion.Head(stamp, actuator), fields)
 

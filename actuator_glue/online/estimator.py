@@ -95,7 +95,7 @@ class Estimator:
 
     Args:
         settings: settings; they do not change.
-        model: model to fit, or several structures.
+        model: model to fit, or several structures; also what another actuator begins with.
         live: a few windows wait, so that a slow computer drops windows instead of falling
             behind; otherwise every window waits its turn.
         schedule: repeats a live run.
@@ -112,7 +112,8 @@ class Estimator:
         carried: Carried | None = None,
     ) -> None:
         self.settings = settings
-        self._members = CarriedStructures(settings, carried, Proposal.of(model))
+        self._first = Proposal.of(model)
+        self._members = CarriedStructures(settings, carried, self._first)
         self.live = live
         self.schedule = schedule
         self.running: Job | None = None
@@ -121,6 +122,7 @@ class Estimator:
         self._applied = 0  # number of the schedule's models in use so far
         self._course = ReplayPosition()
         self._before: _Before | None = None
+        self._epoch: int | None = None
         self._patience = 1.0
         self._frozen: list[FrozenPosterior] = []
         self._pending: Proposal | None = None
@@ -194,7 +196,7 @@ class Estimator:
         return []
 
     def set_model(self, model: ModelChoice | Proposal) -> None:
-        """Go on with another model, or several structures, from the next job on."""
+        """Go on with another model, or several structures, until the actuator is another one."""
         self._pending = Proposal.of(model)
 
     def drop(self, late: Callable[[Window], bool]) -> list[Event]:
@@ -212,6 +214,7 @@ class Estimator:
         proposal = self._proposed(window)
         if proposal is not None:
             self._begin(proposal)
+        self._epoch = window.epoch
         stops: tuple[int | None, ...] = (None,) * len(self._members)
         if self.schedule is not None:
             stops = self.schedule.done[_key(window)][1]
@@ -414,11 +417,12 @@ class Estimator:
     def _proposed(self, window: Window) -> Proposal | None:
         """Return the proposal to carry from a window on; None where it is not new.
 
-        Of a schedule, those before it are begun with here: their windows failed, and are not in
-        the bag.
+        What was found on one actuator says nothing about another. Of a schedule, those before it
+        are begun with here: their windows failed, and are not in the bag.
         """
         if self.schedule is None:
-            return self._pending
+            other = self._epoch not in (None, window.epoch) and self.proposal != self._first
+            return self._pending or (self._first if other else None)
         due = [model for number, model in self.schedule.models if number <= window.number]
         if len(due) == self._applied:
             return None

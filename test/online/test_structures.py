@@ -453,6 +453,36 @@ def test_without_rivals_that_were_there_before_nothing_is_taken_out():
     assert not estimator._members._outdone((1.0,), 1e-9)
 
 
+def test_what_was_found_on_one_actuator_is_not_carried_on_to_another():
+    """Nor in a replay of the stream."""
+    record = lost_motion(4.0)
+    later = replace(record, start_ns=record.start_ns + 10**11, actuator='other')
+    items = [*stream(replace(record, actuator='one')), *stream(later)]
+    estimator, found, models = Estimator(SETTINGS, choose_model()), [], [(0, choose_model())]
+    for item in items:
+        give(estimator, item)
+        while (job := estimator.next_job()) is not None:
+            found.append(run(job))
+            estimator.finish(found[-1])
+            if job.proposal is not None:
+                models.append((job.window.number, job.proposal))
+            if job.window.number == 1:
+                estimator.set_model(choose_model(('backlash',)))
+    assert {(r.window.epoch, r.model.effects) for r in found[2:]} == {
+        (1, ('backlash',)),
+        (2, ()),
+    }
+    assert [model.structures[0].model.effects for _, model in models[1:]] == [('backlash',), ()]
+    done = {
+        (r.window.record.first_index, r.window.record.start_ns): (r.window.number, r.spent)
+        for r in found
+    }
+    again = replay(items, SETTINGS, schedule=Schedule(done, tuple(models)))
+    twice = [r for r in again if isinstance(r, WindowResult)]
+    for one, other in zip(found, twice, strict=True):
+        assert np.array_equal(one.moments.mean, other.moments.mean)
+
+
 @pytest.mark.parametrize('afresh', [False, True])
 def test_a_structure_that_begins_afresh_forgets_what_it_learned(afresh):
     """What it learned may be what no window can be estimated with; a replay forgets it, too."""
