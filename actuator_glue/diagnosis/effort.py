@@ -35,21 +35,21 @@ class Effort:
     beyond: float = 0.0
     tell: Callable[[], None] = lambda: None
     _refits: list[int] = field(default_factory=list)
-    _promises: list[bool] = field(default_factory=list)
+    _missing: list[bool] = field(default_factory=list)
 
     def spent_on(self, found: Fit) -> Fit:
         """Count the work of a refit, from any thread; return the refit."""
         self._refits.append(found.work)
         return found
 
-    def expects(self, more: bool) -> None:
-        """Take down whether signatures promise that a search will find an effect."""
-        self._promises.append(more)
+    def expects(self, missing: bool) -> None:
+        """Take down whether a search begins with something missing."""
+        self._missing.append(missing)
 
     @property
-    def promising(self) -> bool:
-        """Whether any of its searches expects to find an effect."""
-        return any(self._promises)
+    def missing(self) -> bool | None:
+        """Whether any of its searches began with something missing; None before the first."""
+        return any(self._missing) if self._missing else None
 
     def extended(self) -> Effort:
         """Return the same effort for a search that begins late, which may go beyond it."""

@@ -48,18 +48,37 @@ def test_the_share_that_is_done_never_falls() -> None:
     assert overall('effect 1', 0.5) == 1.0
 
 
-def test_while_the_search_lasts_its_effort_says_how_long() -> None:
-    """A healthy machine is done after the first stage, one with several effects takes it all."""
-    for missing, most in ((False, 0.59), (True, 0.29)):
+def test_what_is_missing_tells_how_long_it_takes() -> None:
+    """The first stage is a larger share of a search that finds nothing."""
+    shares = []
+    for missing in (False, True):
         effort = Effort(100.0)
         overall = ShareDone(effort)
+        overall('base fit', 0.0)
         effort.expects(missing)
-        spent(effort, 10)
-        assert overall('effect 1', 0.5) == pytest.approx(0.5 * most, abs=0.05)
-        spent(effort, 10)
-        assert overall('effect 1', 1.0) == pytest.approx(most, abs=0.05)
-    spent(effort, 40)
-    assert overall('effect 3', 0.0) == pytest.approx(0.5, abs=0.05)
+        shares.append([overall('effect 1', 0.0), overall('effect 1', 1.0)])
+    (begin, end), (later, last) = shares
+    assert begin > later and end > last and end - begin > last - later
+
+
+def test_a_further_search_takes_as_long_as_all_before() -> None:
+    """And no longer than to the posterior."""
+    effort = Effort(100.0)
+    overall = ShareDone(effort)
+    overall('base fit', 0.0)
+    effort.expects(True)
+    overall('effect 1', 0.0)
+    spent(effort, 10)
+    for stage in ('weighing', 'rivals'):
+        overall(stage, 0.0)
+    first = overall('other hold', 0.0)
+    assert overall('effect 1', 1.0) == first  # this stage says little of the whole
+    spent(effort, 5)
+    half = overall('effect 1', 1.0)
+    spent(effort, 5)
+    whole = overall('rivals', 0.0)
+    assert first < half < whole and half - first == pytest.approx(whole - half)
+    assert whole <= overall('posterior', 0.0) < 0.9
 
 
 def test_a_stage_that_nobody_knows_is_no_reason_to_fail() -> None:

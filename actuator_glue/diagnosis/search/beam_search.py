@@ -128,10 +128,10 @@ class BeamSearch(Judge):
         self.renoise()
         base = self.refits.trial(())
         below = base.mean_square - (SEEN * self.material) ** 2
-        promised = self.refits.promises.left(base, self.refits.names)
-        self.refits.effort.expects(any(left < below for _, left in promised))
+        self.refits.effort.expects(self.left(base) >= self.material)
         tell = partial(self.progress, 'effect 1')
         singles = self.refits.additions(base, None, tell, below=below)
+        self.progress('weighing', 0.0)
         self.renoise(self._nearest(singles))
         base, singles = self.refits.trial(()), self.rescored(singles)
         self._set_nats()
@@ -264,6 +264,7 @@ class BeamSearch(Judge):
             exchanged: whether rivals are refitted, and take a member's place where they are
                 better; else only rivals known already are reported.
         """
+        self.progress('rivals', 0.0)
         current = self.pruned(current)
         if exchanged:
             for name in current.effects:
