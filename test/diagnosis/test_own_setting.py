@@ -9,7 +9,7 @@ from two_sweeps import NOISE, RATE, selected_of, sweep
 
 from actuator_glue.diagnosis.moves.own_setting import _with_setting
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
-from actuator_glue.diagnosis.verdict.both_parts import _where_it_acts
+from actuator_glue.diagnosis.verdict.both_parts import _acting, _where_it_acts
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -64,3 +64,13 @@ def test_only_a_held_out_record_tells_how_it_was_set() -> None:
     found = _where_it_acts(own, np.append(THETA, 1.02), held)
     assert found.own == 'gain' and len(found.records) == 2
     assert found.records[0] is fitted and found.records[1] is set_again
+    # Where none was set so, only what acts everywhere can be confirmed or not.
+    for names, its, there in (
+        (('gain',), own, False),
+        (('gain', 'delay'), own, True),
+        (('gain',), found, True),
+        (('delay',), None, True),
+        ((), None, False),
+    ):
+        decision: Any = SimpleNamespace(names=names, final=SimpleNamespace(own=its))
+        assert _acting(decision, held) is there

@@ -49,19 +49,22 @@ def test_the_best_of_many_candidates_by_chance() -> None:
 def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     """Names that leave three times the noise where nothing was fitted are not certain."""
     error = HeldOutError(95e-6, (0, 1), 31e-6, (25e-6, 37e-6), 10e-6, 0.9, (0.8, 1.0), 95e-6)
-    assert rules.certainty(0.95, error, 5e-6) == pytest.approx(0.9)
+    assert rules.certainty(0.95, True, error, 5e-6) == pytest.approx(0.9)
     # What one stretch of it shows alone is none of that, unless it is far above the noise.
     stretch = replace(error, after=13e-6, after_ci=(9e-6, 20e-6))
-    assert rules.certainty(0.95, stretch, 5e-6) == 0.95
-    assert rules.certainty(0.95, replace(error, after_ci=(9e-6, 50e-6)), 5e-6) == 0.9
+    assert rules.certainty(0.95, True, stretch, 5e-6) == 0.95
+    assert rules.certainty(0.95, True, replace(error, after_ci=(9e-6, 50e-6)), 5e-6) == 0.9
     good = replace(error, after=11e-6, removable_removed=0.99)
-    assert rules.certainty(0.95, good, 5e-6) == 0.95
+    assert rules.certainty(0.95, True, good, 5e-6) == 0.95
     # A verdict that says the held-out part does not ask for the name gives it no probability.
     nothing = replace(
         error, before=10e-6, after=10e-6, removable_removed=0.0, removed_ci=(-0.5, 0.5)
     )
     assert rules.of_both_parts('missing-effect', True, nothing, 5e-6) == 'undecided'
-    assert rules.certainty(0.95, nothing, 5e-6) == 0.0
+    assert rules.certainty(0.95, True, nothing, 5e-6) == 0.0
+    # Of what does not act in it, it says nothing.
+    assert rules.of_both_parts('missing-effect', False, nothing, 5e-6) == 'missing-effect'
+    assert rules.certainty(0.95, False, nothing, 5e-6) == 0.95
 
 
 def test_held_out_records_may_show_little_of_what_matters() -> None:
@@ -70,7 +73,7 @@ def test_held_out_records_may_show_little_of_what_matters() -> None:
         10.3e-6, (9.8e-6, 10.8e-6), 10.0e-6, (9.5e-6, 10.5e-6), 10e-6, 1.0, (0.5, 2.5), 10.3e-6
     )
     assert rules.of_both_parts('missing-effect', True, little, 5e-6) == 'missing-effect'
-    assert rules.certainty(0.95, little, 5e-6) == 0.95
+    assert rules.certainty(0.95, True, little, 5e-6) == 0.95
     chance = replace(little, removed_ci=(-0.2, 2.5))
     assert rules.of_both_parts('missing-effect', True, chance, 5e-6) == 'undecided'
     part = replace(

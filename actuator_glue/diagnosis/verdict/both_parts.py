@@ -70,6 +70,15 @@ def _where_it_acts(own: OneRecord, theta: Array, held: Data) -> OneRecord:
     return own.acting_in((*own.records, *more))
 
 
+def _acting(decision: Decision, held: Data) -> bool:
+    """Whether any addition acts in the held-out part; of one that does not, that says nothing."""
+    own = decision.final.own
+    if not isinstance(own, OneRecord):
+        return bool(decision.names)
+    there = any(record is its for record in held.records for its in own.records)
+    return there or any(name != own.own for name in decision.names)
+
+
 def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) -> BothParts:
     """Look at the held-out part once, and return the verdict of both parts.
 
@@ -85,6 +94,7 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) 
         own = _where_it_acts(after.model, after.theta, result.prepared.held)
         after = replace(after, model=own)
         decision = replace(decision, final=replace(decision.final, own=own))
+    acting = _acting(decision, result.prepared.held)
     held, fitted = (replace(d, each=each) for d in (result.prepared.held, result.data))
     error, coverage, curves = verify(
         fitted, held, before, after, decision.noise, seed, result.line, len(found.singles)
@@ -92,14 +102,14 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) 
     error = held_out_reach.reached_by_both(
         error, found.material, result.scorer, held, before, after
     )
-    judged = rules.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
+    judged = rules.of_both_parts(decision.verdict, acting, error, found.material)
     described = any_learned(decision.final.structure)
     if other is not None and described and judged in COMPLETE:
         # A learned term that another set-up makes unnecessary describes the wrong set-up.
         judged = 'unexplained'
     draws, fixed = drawn.spread(judged in COMPLETE)
     sizes = estimates(drawn.space, after.model, draws, fixed)
-    certain = rules.certainty(decision.certainty, error, found.material)
+    certain = rules.certainty(decision.certainty, acting, error, found.material)
     decision = replace(decision, certainty=certain)
     stretches = agreement.agreement(decision.final, result.scorer)
     effects = findings.of(decision, found, sizes, stretches)

@@ -101,7 +101,7 @@ def excuse(error: HeldOutError, material: float) -> Excuse | None:
     return Excuse(None, error.least, how, 'with them')
 
 
-def of_both_parts(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:
+def of_both_parts(verdict: Verdict, acting: bool, error: HeldOutError, material: float) -> Verdict:
     """Return the verdict of both parts.
 
     Additions were chosen on the fitting part alone and stay in the model. Where they remove
@@ -112,16 +112,16 @@ def of_both_parts(verdict: Verdict, moved: bool, error: HeldOutError, material: 
 
     Args:
         verdict: what the fitting part says.
-        moved: whether an effect on the motion was added to Eq. (2).
+        acting: whether an effect on the motion was added that acts in the held-out part.
         error: held-out error before and after.
         material: smallest error that matters [m].
     """
-    if moved and not borne_out(error, material):
+    if acting and not borne_out(error, material):
         return 'undecided'
     if verdict == 'unexplained' or not (misses(error, material) or far(error, material)):
         return verdict
     part = error.removed_ci[0] > 0.0 or takes_nothing(error, material)
-    return 'unexplained' if moved and part else 'undecided'
+    return 'unexplained' if acting and part else 'undecided'
 
 
 def named(verdict: Verdict, effects: Sequence[Finding]) -> Verdict:
@@ -145,16 +145,17 @@ def likely(effect: Finding) -> bool:
     return effect.probability + sum(tied) >= LIKELY
 
 
-def certainty(fitted: float, error: HeldOutError, material: float) -> float:
+def certainty(fitted: float, acting: bool, error: HeldOutError, material: float) -> float:
     """Return the factor on the names' share of the weight, in [0, 1].
 
     Args:
         fitted: that of the fitting part.
+        acting: whether any addition acts in the held-out part.
         error: held-out error. Where it is more than noise, or additions at their best fit remove
             nothing of it, the factor is at most the share removed, with likely parameters at need.
         material: smallest error that matters [m].
     """
-    nothing = takes_nothing(error, material)
+    nothing = acting and takes_nothing(error, material)
     if not (nothing or misses(error, material)):
         return fitted
     reached = nothing and borne_out(error, material)
