@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from actuator_glue.model.effects import CATALOGUE
 
 NEUTRAL = {p.name: p.neutral for e in CATALOGUE.values() for p in e.parameters}
-Q, QD, F, X, V, Z, ENV, LEVEL, Y, W, WV = range(11)
+Q, QD, F, X, V, Z, ENV, LEVEL, Y, W, WV, LOST = range(12)
 
 
 def sign(value):
@@ -72,7 +72,7 @@ class Reference:
     def rhs(self, t, s, mode):
         """Time derivative; mode 0: no dry friction, 1 / -1: slipping, 2: sticking."""
         # Plain numbers: numpy's take several times as long.
-        p, s, out = self.p, s.tolist(), [0.0] * 11
+        p, s, out = self.p, s.tolist(), [0.0] * 12
         own, share = s[X] + s[W], p['feedback_share']
         recorded = self.transducer(t, s[Y] if p['sensor_lag'] > 0.0 else self.seen(s))
         position = own + share * (recorded - own)
@@ -90,6 +90,9 @@ class Reference:
         if p['saturation_velocity'] < NEUTRAL['saturation_velocity']:
             limit = self.a2 * p['saturation_velocity']
             flow = min(max(flow, -limit), limit)
+        flow *= sqrt(min(max(1.0 - s[LOST], 0.0), 1.0))
+        beyond = p['depletion'] * (abs(flow) / self.a2 - p['pump_velocity'])
+        out[LOST] = beyond if s[LOST] > 0.0 else max(beyond, 0.0)
         out[ENV] = (abs(s[Q]) / self.a2 - s[ENV]) / p['droop_time']
         oil = flow - self.a3 * s[F] - self.a2 * s[WV]
         force, slope, with_z = self.specimen(s[X], s[Z])
@@ -145,7 +148,7 @@ class Reference:
         at = np.arange((len(u) - 1) * fine + 1) * period / fine
         # A tenth of it, and other methods, change no case by more than 0.002 um.
         options = {'rtol': 1e-7, 'atol': self.tolerance(), 'max_step': period, 'method': 'LSODA'}
-        state = np.zeros(11)
+        state = np.zeros(12)
         if self.rise > 0.0:
             state[LEVEL] = 0.0
         if self.dry == 0.0:
@@ -156,7 +159,7 @@ class Reference:
 
     def tolerance(self):
         """Absolute tolerances: 1e-10 m, and forces and flows accordingly."""
-        scale = np.full(11, 1e-10)
+        scale = np.full(12, 1e-10)
         scale[[Q, QD]] *= self.a2 * np.array([10.0, 1e3])
         scale[[F, LEVEL]] *= self.a2
         scale[[V, WV]] *= 100.0
@@ -164,7 +167,7 @@ class Reference:
 
     def hybrid(self, at, state, options):
         """Stick and slip with located events."""
-        out, t, mode = np.zeros((11, len(at))), 0.0, 2
+        out, t, mode = np.zeros((12, len(at))), 0.0, 2
 
         def margin(t, s, mode):
             force = s[F] - self.specimen(s[X], s[Z])[0]

@@ -27,7 +27,14 @@ PLACES = {
         'valve-underlap',
         'integral-action',
     },
-    'flow': {'flow-saturation', 'pressure-flow', 'flow-asymmetry', 'supply-droop', 'gain-drift'},
+    'flow': {
+        'flow-saturation',
+        'pressure-flow',
+        'flow-asymmetry',
+        'supply-droop',
+        'gain-drift',
+        'accumulator-depletion',
+    },
     'piston': {'coulomb-friction', 'stribeck-friction', 'backlash'},
     'specimen': {
         'viscous-damping',

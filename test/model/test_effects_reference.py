@@ -28,6 +28,8 @@ CASES = [
     ('flow-asymmetry', {'asymmetry': 0.1}, 250e3),
     ('supply-droop', {'droop': 3.0, 'droop_time': 0.3}, 0.0),
     ('gain-drift', {'gain_drift': 0.02}, 250e3),
+    ('accumulator-depletion', {'depletion': 8.0, 'pump_velocity': 0.02}, 0.0),
+    ('accumulator-depletion', {'depletion': 20.0, 'pump_velocity': 0.03}, 250e3),
     ('coulomb-friction', {'coulomb_force': 10.0}, 250e3),
     ('coulomb-friction', {'coulomb_force': 10.0}, 0.0),
     (
