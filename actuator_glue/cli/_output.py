@@ -86,16 +86,17 @@ def note(line: str) -> None:
     print(f'note: {_told(line)}', file=sys.stderr)
 
 
-def few(found: Sequence[T], what: str, path: str) -> tuple[Sequence[T], list[str]]:
+def few(found: Sequence[T], what: str, *paths: str) -> tuple[Sequence[T], list[str]]:
     """Return the first of what may be thousands, and a line on how many more there are.
 
     Args:
         found: of one kind.
         what: they are, in the plural.
-        path: whose `info --json` has them all.
+        paths: whose `info --json` has them all.
     """
-    more, where = len(found) - _MANY, f'actuator-glue info {shlex.quote(path)} --split --json OUT'
-    told = f'{path}: {more} more {what}, {len(found)} in all: `{where}` has them'
+    more, where = len(found) - _MANY, f'actuator-glue info {shlex.join(paths)} --split --json OUT'
+    whose = paths[0] if len(paths) == 1 else f'{len(paths)} files'
+    told = f'{whose}: {more} more {what}, {len(found)} in all: `{where}` has them'
     return found[:_MANY], [told] if more > 0 else []
 
 

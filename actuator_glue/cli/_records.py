@@ -101,7 +101,7 @@ def load(args: argparse.Namespace) -> list[Record]:
             warn=note,
         )
     finally:
-        shown, more = few(gaps, 'gaps', args.records[0])
+        shown, more = few(gaps, 'gaps', *args.records)
         for line in (*shown, *more):
             note(line)
     speak(found[0].motion)

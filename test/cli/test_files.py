@@ -185,6 +185,11 @@ def test_of_very_many_gaps_a_few_are_told_and_where_the_rest_is(
     assert done.code == 0
     assert done.err.count(' are missing before sample ') == 20
     assert f'59 more gaps, {where}' in done.err
+    # Of several files the rest may be of any of them.
+    done = run('convert', short_bag, bag, tmp_path / 'both', '--split')
+    assert done.code == 0
+    where = f"`actuator-glue info {short_bag} '{bag}' --split --json OUT` has them"
+    assert f'2 files: 59 more gaps, 79 in all: {where}' in done.err
 
 
 def test_pictures_of_records(run, tmp_path: Path, short_bag: Path, problem_r: Path) -> None:
