@@ -65,42 +65,39 @@ def of_variable(name: str, value: str, *, words: bool) -> bool:
     return note_of(name) == 'stiffness_N_per_m' or is_rate(name)
 
 
-def noted(notes: Mapping[str, str], where: str) -> dict[str, str]:
+def noted(notes: Mapping[str, str], where: str, *, beside_map: bool = False) -> dict[str, str]:
     """Return what a file says besides, by the names of `NOTES`; other notes are left out.
 
     Args:
         notes: all that the file says, by the names that it uses; those that are not in `NOTES`
             with the colon behind them where the file has one.
         where: file, for messages.
+        beside_map: a channel map describes the file: what is nearly right is prose.
 
     Raises:
         InputError: a name that is nearly one of `NOTES`, or one said twice, differently.
     """
     found: dict[str, str] = {}
-    for name, value in notes.items():
+    for name, value in (stated(notes) if beside_map else notes).items():
         known, meant = note_of(name), _meant(name.removesuffix(':'))
-        if known is not None and not _ours(name, value):
-            continue
-        sign = '' if name.endswith(':') else ' ='
-        if known is None and meant is not None:
+        if known is not None:
+            if _ours(name, value):
+                add_note(found, known, value, where)
+        elif meant is not None and not beside_map:
+            sign = '' if name.endswith(':') else ' ='
             raise InputError(
                 f'{where}: the note {f"{name}{sign} {value}"!r} is not understood; write '
                 f'`{meant} = VALUE`, which is {NOTES[meant]}, or take it out'
             )
-        if known is not None:
-            add_note(found, known, value, where)
     return found
 
 
 def stated(notes: Mapping[str, str]) -> dict[str, str]:
-    """Return what notes of a laboratory's own say: a `hold` of `5 s` is that of a load."""
-    known = {name: note_of(name) for name in notes}
-    return {
-        name: notes[name]
-        for name, meant in known.items()
-        if rate_of(name, notes[name]) is not None
-        or (meant is not None and (meant not in _STATED or _is_stated(meant, notes[name])))
-    }
+    """Return what words of a laboratory's own say of `NOTES`, right or nearly, and of the rate.
+
+    A `hold` of `5 s` is that of a load, and a `stiffness` `of steel` no number.
+    """
+    return {n: value for n, value in notes.items() if _is_stated(n.removesuffix(':'), value)}
 
 
 def of_groups(groups: Iterable[Mapping[str, str]]) -> tuple[dict[str, str], tuple[str, ...]]:
@@ -158,14 +155,14 @@ def add_note(notes: dict[str, str], name: str, value: str, where: str) -> None:
 
 def _states(name: str, value: str) -> bool:
     """Return whether a name with its value behind a colon is a note, right or nearly, no prose."""
-    meant = _meant(name)
-    if note_of(name) is not None or meant is None:
-        return note_of(name) is not None or rate_of(name, value) is not None
-    return _is_stated(meant, value)
+    return note_of(name) is not None or _is_stated(name, value)
 
 
-def _is_stated(meant: str, value: str) -> bool:
-    return _STATED[meant].fullmatch(value.strip().casefold()) is not None
+def _is_stated(name: str, value: str) -> bool:
+    meant = note_of(name) or _meant(name)
+    if meant in _STATED:
+        return _STATED[meant].fullmatch(value.strip().casefold()) is not None
+    return meant is not None or rate_of(name, value) is not None
 
 
 def _ours(name: str, value: str) -> bool:

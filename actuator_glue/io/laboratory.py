@@ -16,7 +16,7 @@ from actuator_glue.even_times import uniform_period
 from actuator_glue.given import path as path_given
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
-from actuator_glue.io.file_notes import noted, stated
+from actuator_glue.io.file_notes import noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.noted_rate import noted_rates
 from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
@@ -307,7 +307,7 @@ def _mapped(
         if c.scale == 1.0 and c.offset == 0.0
     ]
     told = (*table.told, *_unlike_map(table, roles), *_unscaled(as_they_are))
-    notes = noted(stated(table.notes), str(path))
+    notes = noted(table.notes, str(path), beside_map=True)
     own = {
         'stiffness_N_per_m': channels.stiffness,
         'hold': channels.hold,

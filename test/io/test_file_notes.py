@@ -1,9 +1,11 @@
 """Stiffness, hold and name that a file states: nearly right is not passed over."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import numpy as np
+import openpyxl
 import pytest
 from nptdms import ChannelObject, GroupObject, TdmsWriter
 from scipy.io import savemat
@@ -216,13 +218,76 @@ def test_what_a_group_says_counts(tmp_path: Path) -> None:
     """Only attributes of the file itself did: the hold was zoh without a word."""
     record = read(grouped(tmp_path / 'a.h5', 'linear', 'linear'))
     assert (record.hold, record.stiffness) == ('linear', 250e3)
-    path = tmp_path / 'a.tdms'
+    record = read(tdms(tmp_path / 'a.tdms', hold='linear', stiffness_N_per_m=250e3))
+    assert (record.hold, record.stiffness) == ('linear', 250e3)
+
+
+def tdms(path: Path, **said: object) -> Path:
+    """Write a group with properties and channels."""
     with TdmsWriter(str(path)) as file:
         channels = [ChannelObject('g', name, values) for name, values in COLUMNS.items()]
-        said = GroupObject('g', properties={'hold': 'linear', 'stiffness_N_per_m': 250e3})
-        file.write_segment([said, *channels])
-    record = read(path)
-    assert (record.hold, record.stiffness) == ('linear', 250e3)
+        file.write_segment([GroupObject('g', properties=said), *channels])
+    return path
+
+
+def of_group(path: Path, **said: object) -> Path:
+    """Write a group with attributes and channels."""
+    with h5py.File(path, 'w') as file:
+        group = file.create_group('g')
+        group.update(COLUMNS)
+        group.attrs.update(said)
+    return path
+
+
+def sheet(path: Path, **said: object) -> Path:
+    """Write a workbook with settings in two cells, a number's unit in a third."""
+    book = openpyxl.Workbook()
+    for name, value in said.items():
+        number, _, unit = str(value).partition(' ')
+        with_unit = [float(number), unit] if unit and number.isdigit() else [value]
+        book.active.append([name, *with_unit])
+    book.active.append(list(COLUMNS))
+    for row in zip(*COLUMNS.values(), strict=True):
+        book.active.append(row)
+    book.save(path)
+    return path
+
+
+GROUPED = [('a.tdms', tdms), ('a.h5', of_group), ('a.xlsx', sheet)]
+
+
+@pytest.mark.parametrize(('name', 'make'), GROUPED)
+@pytest.mark.parametrize(
+    ('said', 'meant'),
+    [
+        ({'Stiffness': 250e3}, 'stiffness_N_per_m'),
+        ({'specimen stiffness': '250 N/mm'}, 'stiffness_N_per_m'),
+        ({'hold type': 'linear'}, 'hold'),
+    ],
+)
+def test_settings_nearly_right_are_refused_in_each_format(
+    tmp_path: Path, name: str, make: Callable[..., Path], said: dict[str, object], meant: str
+) -> None:
+    """Of sheets and groups they were left out without a word."""
+    path = make(tmp_path / name, **said)
+    with pytest.raises(InputError, match=f'is not understood; write `{meant} = VALUE`'):
+        read(path)
+    content = parse_channel_map(MAP | {'hold': 'linear'}, 'a map')
+    assert read(path, channels=content).hold == 'linear'
+
+
+@pytest.mark.parametrize(('name', 'make'), GROUPED)
+def test_words_of_a_laboratory_are_no_settings(
+    tmp_path: Path, name: str, make: Callable[..., Path]
+) -> None:
+    own = {'stiffness': 'of steel', 'hold': '5 s', 'hold mode': 'none', 'Specimen': 'spring 3'}
+    record = read(make(tmp_path / name, actuator='mts 3', **own))
+    assert (record.hold, record.stiffness, record.actuator) == ('zoh', None, 'mts 3')
+
+
+def test_a_stiffness_in_a_sheet_may_have_its_unit_beside_it(tmp_path: Path) -> None:
+    """It was left out without a word."""
+    assert read(sheet(tmp_path / 'a.xlsx', stiffness_N_per_m='250000 N/m')).stiffness == 250e3
 
 
 def test_groups_that_differ_are_told(tmp_path: Path) -> None:

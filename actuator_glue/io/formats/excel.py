@@ -179,17 +179,22 @@ def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[C
 def _notes(rows: list[tuple[Any, ...]], path: Path) -> dict[str, str]:
     """Return what stands above the names: `hold` and `linear` in two cells, or `# hold = linear`.
 
-    Other words than those of `NOTES` are the laboratory's own.
+    A number may have its unit in a third cell. Other words than those of `NOTES` are the
+    laboratory's own.
     """
     notes: dict[str, str] = {}
     for row in rows:
-        filled = [str(v).strip() for v in row if v is not None]
-        said = {filled[0]: filled[1]} if len(filled) == 2 else {}
-        if len(filled) == 1 and filled[0].startswith('#'):
-            take_note(filled[0].lstrip('# '), said, str(path))
-        for name, value in stated(said).items():
-            add_note(notes, name, value, str(path))
-        take_rate('\t'.join(filled).lstrip('# '), notes)
+        filled = [v for v in row if v is not None]
+        name, *value = [str(v).strip() for v in filled] or ['']
+        said: dict[str, str] = {}
+        if len(value) == 1 or (len(value) == 2 and _is_number(filled[1])):
+            said = {name.lstrip('# '): ' '.join(value)}
+        elif not value and name.startswith('#'):
+            take_note(name.lstrip('# '), said, str(path))
+        else:
+            take_rate('\t'.join([name, *value]).lstrip('# '), said)
+        for key, text in stated(said).items():
+            add_note(notes, key, text, str(path))
     return notes
 
 
