@@ -69,7 +69,7 @@ def read_mapped(
         raw, start, period = _sampled(tracks, (begin, end), channels.rate, hold, warn, f'{path}')
         if len(raw['command']) < 2:
             continue
-        channel = in_si(raw, channels, str(path))
+        channel = in_si(raw, channels.roles(), str(path), channels.rest_samples)
         number = f' (record {len(records) + 1})' if len(stretches) > 1 else ''
         records.append(
             Record(

@@ -12,12 +12,11 @@ import scipy
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.even_times import uniform_period
 from actuator_glue.given import one_of
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import ChannelMap, channel_map_given
 from actuator_glue.io.laboratory import Channels, channels_of
-from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
+from actuator_glue.io.resample import Resample, evenly, rate_and_way
 from actuator_glue.records import Array, Hold, Record
 
 By: TypeAlias = Literal['time', 'correlation']
@@ -133,13 +132,8 @@ def join(
     source = f'{response_file} (command of {Path(command_file).name})'
     values['time'] = times[1][inside]
     first = round((float(values['time'][0]) - float(times[1][0])) * 1e9)
-    try:
-        period = uniform_period(values['time'], str(response_file))
-    except InputError:
-        if way is None:
-            raise
-        made = resample_evenly(values, *way, where=str(response_file))
-        values, period = made.values, made.period
+    values, period, made = evenly(values, way, str(response_file))
+    if made is not None:
         warn(f'{response_file}: {made.told()}')
         source = f'{source} ({made.name()})'
     how = 'held' if held else 'straight between its samples'

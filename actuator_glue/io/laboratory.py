@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -12,14 +12,13 @@ import numpy as np
 
 from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
-from actuator_glue.even_times import uniform_period
 from actuator_glue.given import path as path_given
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
 from actuator_glue.io.file_notes import noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.noted_rate import noted_rates
-from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
+from actuator_glue.io.resample import Resample, evenly, rate_and_way
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.units import (
     FLOAT32_COUNTS,
@@ -104,26 +103,19 @@ def read(
     found = channels_of(path, channels)
     for line in found.told:
         warn(f'{path}: {line}')
-    values, period = found.values, found.period
+    values, period, source = found.values, found.period, str(path)
     said_hold = None if found.hold is None else found.hold.strip().lower()
     first = float(values['time'][0]) if 'time' in values else 0.0
-    source = str(path)
     if period is None:
-        try:
-            period = uniform_period(values['time'], source)
-        except InputError:
-            if way is None:
-                raise
-            made = resample_evenly(values, *way, where=source)
-            values, period = made.values, made.period
+        values, period, made = evenly(values, way, source)
+        if made is not None:
             warn(f'{path}: {made.told()}')
             source, said_hold = f'{path} ({made.name()})', said_hold or 'linear'
-        else:
-            if way is not None and abs(period * way[0] - 1.0) > _OTHER_RATE:
-                warn(
-                    f'{path}: its clock is even already, at {1.0 / period:.6g} Hz, and stays so: '
-                    '--resample makes jittered clocks even and changes no other rate; leave it out'
-                )
+        elif way is not None and abs(period * way[0] - 1.0) > _OTHER_RATE:
+            warn(
+                f'{path}: its clock is even already, at {1.0 / period:.6g} Hz, and stays so: '
+                '--resample makes jittered clocks even and changes no other rate; leave it out'
+            )
     elif way is not None:
         raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():
@@ -174,30 +166,37 @@ def channels_of(
     if path.is_dir():
         raise InputError(f'{path}: this is a folder, and no bag in MCAP format; give its files')
     channels = channel_map_given(channels)
+    table = format_of(path).read(path, channels)
+    told = [*table.told]
     if channels is None:
-        values, notes, period, start_ns, motion, told = _by_name(path, needed)
+        roles, motion, period = _by_name(path, table, needed, told)
+        values = in_si(_raw(path, roles, table), roles, str(path))
+        if period is not None and 'time' in values:
+            _check_period(period, values['time'], path)
+            period = None
     else:
-        values, notes, period, start_ns, motion, told = _mapped(path, channels, needed)
-    _refuse_empty(path, values)
-    return Channels(
-        values,
-        period,
-        start_ns,
-        _noted_stiffness(notes, path),
-        notes.get('hold'),
-        notes.get('actuator', 'actuator'),
-        motion,
-        told,
-    )
-
-
-def _refuse_empty(path: Path, values: Mapping[str, Array]) -> None:
+        roles = channels.roles() if needed == _NEEDED else _parts(channels, needed, table)
+        motion = channels.motion
+        period = None if channels.rate is None else 1.0 / channels.rate
+        raw = _raw(path, roles, table, channels.sample_number)
+        values = in_si(raw, roles, str(path), channels.rest_samples)
+        told += _unlike_map(table, roles)
+        if channels.rate is not None:
+            _check_rate(channels.rate, values.get('time'), table, path)
+    told += [*_unscaled(table, roles), *_unlike_clock(table, values.get('time'), period)]
     for name, column in values.items():
         if not len(column):
             raise InputError(
                 f'{path}: channel {name!r} holds no sample; was the file closed by what wrote it, '
                 'and copied whole?'
             )
+    notes = noted(table.notes, str(path), beside_map=channels is not None)
+    stiffness, hold = _noted_stiffness(notes, path), notes.get('hold')
+    actuator = notes.get('actuator', 'actuator')
+    if channels is not None:
+        stiffness = stiffness if channels.stiffness is None else channels.stiffness
+        hold, actuator = channels.hold or hold, channels.actuator or actuator
+    return Channels(values, period, table.start_ns, stiffness, hold, actuator, motion, tuple(told))
 
 
 def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
@@ -209,15 +208,13 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
 
 
 def _by_name(
-    path: Path, needed: tuple[str, ...]
-) -> tuple[dict[str, Array], dict[str, str], float | None, int, str, tuple[str, ...]]:
-    """Return channels in SI units by their names, notes, period, start [ns], motion, what to tell.
+    path: Path, table: FileTable, needed: tuple[str, ...], told: list[str]
+) -> tuple[dict[str, Channel], str, float | None]:
+    """Return the channels that names of columns say, their motion, and the period that is stated.
 
-    There is no period where times say it.
+    What a reader should know of that is added to `told`.
     """
-    table = format_of(path).read(path, None)
-    labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
-    period, told = table.period, [*table.told]
+    period = table.period
     # Of a part of a test a rate does not say when it began.
     if period is None and needed == _NEEDED and (period := stated_period(table)) is not None:
         (note,) = noted_rates(table.notes).values()
@@ -225,23 +222,9 @@ def _by_name(
     if period is not None:
         needed = tuple(role for role in needed if role != 'time')
     _refuse_unread(path, table, {*needed, 'force'})
-    columns, motion = choose(labels, units, str(path), needed)
-    raw = table.values([at for at, _ in columns.values()])
-    _check_numbers(raw, {role: at for role, (at, _) in columns.items()}, table, path)
-    scales = [scale for _, scale in columns.values()]
-    with np.errstate(all='ignore'):  # values that are not finite are reported later
-        values = {
-            r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
-        }
-    notes, start_ns = noted(table.notes, str(path)), table.start_ns
-    told += [
-        *_unscaled(table.columns[at] for at, _ in columns.values()),
-        *_unlike_clock(table, values.get('time'), period),
-    ]
-    if period is not None and 'time' in values:
-        _check_period(period, values['time'], path)
-    del raw, table  # a long file's columns as they were read are not held beside these
-    return values, notes, None if 'time' in values else period, start_ns, motion, tuple(told)
+    labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
+    found, motion = choose(labels, units, str(path), needed)
+    return {role: Channel(at + 1, unit) for role, (at, unit) in found.items()}, motion, period
 
 
 def stated_period(table: FileTable) -> float | None:
@@ -287,42 +270,14 @@ def _refuse_unread(path: Path, table: FileTable, roles: set[str]) -> None:
             )
 
 
-def _mapped(
-    path: Path, channels: ChannelMap, needed: tuple[str, ...]
-) -> tuple[dict[str, Array], dict[str, str], float | None, int, str, tuple[str, ...]]:
-    """Return what `_by_name` does, rest offsets removed.
-
-    The map counts, and what it leaves out is as the file says; there other words than those of
-    `NOTES` are none.
-    """
-    table = format_of(path).read(path, channels)
-    roles = channels.roles() if needed == _NEEDED else _parts(channels, needed, table)
-    raw, counter = _raw(path, channels, roles, table)
-    if counter is not None:
-        _check_counter(counter, path)
-    values = in_si(raw, channels, str(path), roles)
-    as_they_are = [
-        table.columns[position(c.column, table.columns, role)]
-        for role, c in roles.items()
-        if c.scale == 1.0 and c.offset == 0.0
-    ]
-    told = (*table.told, *_unlike_map(table, roles), *_unscaled(as_they_are))
-    notes = noted(table.notes, str(path), beside_map=True)
-    own = {
-        'stiffness_N_per_m': channels.stiffness,
-        'hold': channels.hold,
-        'actuator': channels.actuator,
-    }
-    notes |= {name: str(value) for name, value in own.items() if value is not None}
-    if channels.rate is not None:
-        _check_rate(channels.rate, values.get('time'), table, path)
-    period = None if channels.rate is None else 1.0 / channels.rate
-    told = (*told, *_unlike_clock(table, values.get('time'), period))
-    return values, notes, period, table.start_ns, channels.motion, told
+def _column(channel: Channel, table: FileTable, role: str) -> Column:
+    return table.columns[position(channel.column, table.columns, role)]
 
 
-def _unscaled(columns: Iterable[Column]) -> Iterator[str]:
+def _unscaled(table: FileTable, roles: dict[str, Channel]) -> Iterator[str]:
     """Yield which gains and offsets stand beside numbers that are taken as they are."""
+    as_they_are = {r: c for r, c in roles.items() if c.scale == 1.0 and c.offset == 0.0}
+    columns = [_column(channel, table, role) for role, channel in as_they_are.items()]
     said = [f'{c.name.strip()} has {c.scaling}' for c in columns if c.scaling]
     if said:
         yield (
@@ -334,7 +289,7 @@ def _unscaled(columns: Iterable[Column]) -> Iterator[str]:
 def _unlike_map(table: FileTable, roles: dict[str, Channel]) -> Iterator[str]:
     """Yield where a map gives another unit than the file does, and no scale between them."""
     for role, channel in roles.items():
-        column = table.columns[position(channel.column, table.columns, role)]
+        column = _column(channel, table, role)
         said = symbol(column.unit)
         if not said and (recognise(column.label) or not _NO_UNIT.search(column.label)):
             said = written_unit(column.label)
@@ -365,17 +320,9 @@ def _parts(channels: ChannelMap, needed: tuple[str, ...], table: FileTable) -> d
 
 
 def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -> None:
-    """Refuse a rate in a channel map that the file's own clock contradicts.
+    """Refuse a rate in a channel map [Hz] that the file's own clock contradicts.
 
-    Args:
-        rate: as the map says [Hz].
-        time: times of the samples by the map [s]; None where it names none: then a column that
-            is called time with a unit is looked at.
-        table: the file.
-        path: for messages.
-
-    Raises:
-        InputError: more than 1 % apart.
+    Where the map names no times, a column that is called time with a unit is looked at.
     """
     clocks = {}
     for at, column in enumerate(table.columns if time is None else ()):
@@ -395,16 +342,7 @@ def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -
 
 
 def _check_period(period: float, time: Array, path: Path) -> None:
-    """Refuse a file whose column of times contradicts the clock that it states besides.
-
-    Args:
-        period: that the file states [s].
-        time: times of the samples [s].
-        path: for messages.
-
-    Raises:
-        InputError: more than 1 % apart.
-    """
+    """Refuse a file whose column of times contradicts the period that it states besides [s]."""
     # In units of periods: the comparison wants two seconds of any rate.
     found = rate_by_clock(np.arange(len(time)), time / period, 1.0)
     if found is not None:
@@ -416,58 +354,58 @@ def _check_period(period: float, time: Array, path: Path) -> None:
 
 
 def in_si(
-    raw: dict[str, Array],
-    channels: ChannelMap,
-    source: str,
-    roles: dict[str, Channel] | None = None,
+    raw: dict[str, Array], roles: dict[str, Channel], source: str, rest_samples: int = 0
 ) -> dict[str, Array]:
     """Return channels in SI units, scaled, offsets at rest removed, by their role.
+
+    Args:
+        raw: by role, as a file has them, each of shape (n,).
+        roles: what they are.
+        source: file, for messages.
+        rest_samples: samples at rest at the start, where an offset is to be removed.
 
     Raises:
         InputError: a channel is not at rest where its map says so.
     """
     values = {}
-    for role, channel in (channels.roles() if roles is None else roles).items():
-        where = f'{source}: {role}'
-        column = raw[role] * channel.scale + channel.offset
-        if channel.remove_rest_offset:
-            column = column - _rest_offset(column, channels.rest_samples, where, role)
-        values[role] = column * of_file(role, channel.unit, where)
+    with np.errstate(all='ignore'):  # values that are not finite are reported later
+        for role, channel in roles.items():
+            where, column = f'{source}: {role}', raw[role]
+            if (channel.scale, channel.offset) != (1.0, 0.0):
+                column = column * channel.scale + channel.offset
+            if channel.remove_rest_offset:
+                column = column - _rest_offset(column, rest_samples, where, role)
+            factor = of_file(role, channel.unit, where)
+            values[role] = column if factor == 1.0 else column * factor
     return values
 
 
 def _raw(
-    path: Path, channels: ChannelMap, roles: dict[str, Channel], table: FileTable
-) -> tuple[dict[str, Array], Array | None]:
-    """Return channels as the file has them, and its sample numbers."""
+    path: Path,
+    roles: dict[str, Channel],
+    table: FileTable,
+    sample_number: str | int | None = None,
+) -> dict[str, Array]:
+    """Return channels as the file has them; what counts the samples is checked."""
     wanted: dict[str, str | int] = {role: channel.column for role, channel in roles.items()}
-    if channels.sample_number is not None:
-        wanted['sample_number'] = channels.sample_number
-    at = [position(c, table.columns, f'{path}: {role}') for role, c in wanted.items()]
-    try:
-        found = table.values(at)
-    except IndexError as error:
-        raise InputError(
-            f'{path}: there are {len(table.columns)} columns, the channel map asks for number '
-            f'{max(at) + 1}'
-        ) from error
-    _check_numbers(found, dict(zip(wanted, at, strict=True)), table, path)
-    raw = dict(zip(wanted, found, strict=True))
-    return raw, raw.get('sample_number')
+    if sample_number is not None:
+        wanted['sample_number'] = sample_number
+    at = {role: position(c, table.columns, f'{path}: {role}') for role, c in wanted.items()}
+    raw = dict(zip(at, table.values([*at.values()]), strict=True))
+    _check_numbers(raw, at, table, path)
+    if sample_number is not None:
+        _check_counter(raw['sample_number'], path)
+    return raw
 
 
 def _check_numbers(
-    raw: list[Array], positions: dict[str, int], table: FileTable, path: Path
+    raw: dict[str, Array], positions: dict[str, int], table: FileTable, path: Path
 ) -> None:
-    """Refuse what is no number where the file can show the place.
-
-    Raises:
-        InputError: a needed channel lacks a number.
-    """
+    """Refuse what is no number where the file can show the place."""
     if table.entry is None:
         return
-    for column, (role, at) in zip(raw, positions.items(), strict=True):
-        bad = ~np.isfinite(column)
+    for role, at in positions.items():
+        bad = ~np.isfinite(raw[role])
         if bad.any():
             row = int(bad.argmax())
             if role == 'time' and bad.all():
@@ -487,9 +425,14 @@ def position(column: str | int, columns: list[Column], where: str) -> int:
     """Return the position from 0 of a column given by name or by number from 1.
 
     Raises:
-        InputError: no column, or more than one, has that name.
+        InputError: there are not as many, or no column, or more than one, has that name.
     """
     if isinstance(column, int):
+        if column > len(columns):
+            raise InputError(
+                f'{where}: cannot read the samples: there are {len(columns)} columns, and number '
+                f'{column} is asked for'
+            )
         return column - 1
     hits = [i for i, c in enumerate(columns) if c.name == column]
     hits = hits or [i for i, c in enumerate(columns) if c.label == column]

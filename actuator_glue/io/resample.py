@@ -18,6 +18,7 @@ from actuator_glue.even_times import (
     rounding,
     span,
     told_rate,
+    uniform_period,
 )
 from actuator_glue.given import number, one_of
 from actuator_glue.io.lost_samples import refuse_lost
@@ -26,8 +27,6 @@ from actuator_glue.records import Array
 By: TypeAlias = Literal['band-limited', 'lines']
 # Samples per second that are wanted [Hz], and how where it is not band-limited.
 Resample: TypeAlias = float | tuple[float, By]
-# Times of the samples, a channel, samples per second that are wanted: the channel at even times.
-_Interpolate: TypeAlias = Callable[[Array, Array, float], Array]
 
 # Of the mean rate of the samples. Straight lines fold what is faster into the band below it, and
 # finer ones are the same; a finer command is one that is not cut at its samples.
@@ -145,6 +144,31 @@ def rate_and_way(resample: Resample) -> tuple[float, By]:
     if not 0.0 < found < np.inf:
         raise InputError(f'resample is {found:g}; give samples per second, more than 0')
     return found, by
+
+
+def evenly(
+    values: dict[str, Array], way: tuple[float, By] | None, where: str
+) -> tuple[dict[str, Array], float, Resampled | None]:
+    """Return channels at even times, their period [s], and what was resampled.
+
+    Args:
+        values: channels by role, each of shape (n,), with `time` [s].
+        way: samples per second that are wanted where their clock is not even, and how.
+        where: file, for messages.
+
+    Returns:
+        The channels as they are, and None, where their clock is even.
+
+    Raises:
+        InputError: it is not and there is no way, or as `resample_evenly`.
+    """
+    try:
+        return values, uniform_period(values['time'], where), None
+    except InputError:
+        if way is None:
+            raise
+        made = resample_evenly(values, *way, where=where)
+        return made.values, made.period, made
 
 
 def resample_evenly(

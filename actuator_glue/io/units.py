@@ -358,8 +358,8 @@ def _is_number(text: str) -> bool:
 
 def choose(
     names: list[str], units: list[str], where: str, needed: tuple[str, ...]
-) -> tuple[dict[str, tuple[int, float]], str]:
-    """Return position and factor to SI of every column that has a role, and their motion.
+) -> tuple[dict[str, tuple[int, str]], str]:
+    """Return position and unit of every column that has a role, and their motion.
 
     Args:
         names: column names, unit included.
@@ -377,8 +377,7 @@ def choose(
         role, unit = recognise(name) or ('', '')
         if role:
             called.setdefault(role, []).append((position, unit))
-    found: dict[str, tuple[int, float]] = {}
-    written: dict[str, str] = {}
+    found: dict[str, tuple[int, str]] = {}
     for role, columns in called.items():
         # Beside `command_mm` another quantity is none: `command_velocity_mm_s`.
         able = [(at, unit) for at, unit in columns if not unit or _converts(role, symbol(unit))]
@@ -390,14 +389,14 @@ def choose(
                 f'{names[others[0][0]].strip()!r}; keep one, or name the one that is meant in a '
                 'channel map'
             )
-        written[role] = symbol(unit or stated)
+        found[role] = position, symbol(unit or stated)
         place = f'{where}: column {name!r}'
         if contradict(unit, stated):
             raise InputError(
                 f'{place} has unit {unit!r} in its name, and the file gives {stated!r} as its '
                 'unit; mend the one that is wrong, or say the unit in a channel map'
             )
-        found[role] = (position, of_file(role, written[role], place))
+        of_file(role, found[role][1], place)
     for role in needed:
         if role not in found:
             # Only command or measured is here: the other may be in a file of its own.
@@ -408,6 +407,7 @@ def choose(
                 f'{", ".join(n.strip() for n in names)}. Name them as in {EXAMPLE}, or describe '
                 f'the file with --channels MAP.yaml, which `actuator-glue map` proposes{join}'
             )
+    written = {role: unit for role, (_, unit) in found.items()}
     if not {'command', 'measured'} <= set(found):  # a part of a test
         return found, MOTIONS.get(''.join(written.get(r, '') for r in _MOVING), (METRES, 1.0))[0]
     return found, common_motion(written, where)
