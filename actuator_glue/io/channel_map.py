@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from reprlib import repr as brief
-from typing import Literal
+from typing import Any, Literal
 
 from actuator_glue.errors import InputError
 from actuator_glue.given import of_kind
 from actuator_glue.io.units import ROLES, common_motion, of_file
-from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text, whole
+from actuator_glue.io.yaml_file import QUOTES, choice, mapping, number, read_file, texts, whole
 from actuator_glue.records import check_stiffness
 
 Column = str | int
+# Columns that one file may have; a matrix with more is no list of channels.
+MOST_COLUMNS = 10_000
 _CHOICES = {
     'decimal': ('.', ','),
     'hold': ('zoh', 'linear'),
     'stamps': ('header', 'published', 'logged'),
 }
-# Inside {...} YAML reads the [s] of `column: Time [s]` as a list.
-_BRACKETS = re.compile(r'column:\s*[^\'"\s][^\'",}]*\[')
-_QUOTES = "put quotes around names with brackets, as in column: 'Time [s]'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,15 +107,8 @@ def read_channel_map(path: Path | str) -> ChannelMap:
     Raises:
         InputError: no such file, no YAML, unknown or missing entries, wrong kinds or units.
     """
-    path = located(path, 'channels')
-    text = read_text(
-        path,
-        'channel map',
-        '--channels takes the YAML file that describes the columns of a record, not the record',
-        'channels',
-    )
-    hint = f'; {_QUOTES}' if _BRACKETS.search(text) else ''
-    content = parse(text, f'{path}: channel map', hint)
+    hint = '--channels takes the YAML file that describes the columns of a record, not the record'
+    path, content = read_file(path, 'channel map', hint, 'channels')
     return parse_channel_map(content, str(path))
 
 
@@ -143,28 +134,24 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
     where = f'{source}: channel map'
     values = mapping(content, ChannelMap, where, hidden=('source',))
     for role in ROLES:
-        if values.get(role) is not None:
+        if role in values:
             values[role] = _channel(values[role], role, f'{where}: {role}')
     number(values, 'rate', where, lower=0.1, upper=1e6)
     number(values, 'stiffness', where)
+    if 'stiffness' in values:
+        values['stiffness'] = check_stiffness(values['stiffness'], where)
     for name in ('header_lines', 'rows', 'rest_samples'):
         whole(values, name, where)
     for name, allowed in _CHOICES.items():
-        if values.get(name) is not None and values[name] not in allowed:
-            raise InputError(f'{where}: {name} is {values[name]!r}; use one of {allowed}')
-    for name in ('delimiter', 'actuator'):
-        if values.get(name) is not None and not isinstance(values[name], str):
-            raise InputError(f'{where}: {name} must be text, not {values[name]!r}')
+        choice(values, name, allowed, where)
+    texts(values, ('delimiter', 'actuator'), where)
     if values.get('delimiter') == '':
         raise InputError(
             f'{where}: delimiter is empty; leave it out, and what parts the columns is found, or '
             'give the text between them'
         )
-    if values.get('sample_number') is not None:
-        _column(values['sample_number'], f'{where}: sample_number')
-    if values.get('stiffness') is not None:
-        values['stiffness'] = check_stiffness(values['stiffness'], where)
-    made = ChannelMap(**{k: v for k, v in values.items() if v is not None}, source=source)
+    check_column(values, 'sample_number', where)
+    made = ChannelMap(**values, source=source)
     if made.topics and (made.time is not None or made.sample_number is not None):
         raise InputError(
             f'{where}: messages have stamps of their own; leave `time` and `sample_number` out'
@@ -180,22 +167,39 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
 
 def _channel(content: object, role: str, where: str) -> Channel:
     values = mapping(content, Channel, where)
-    _column(values['column'], where)
-    if isinstance(values['unit'], list):
-        raise InputError(f'{where}: unit is {brief(values["unit"])}; write it without brackets')
-    of_file(role, str(values['unit']) if values['unit'] else None, where)
+    check_column(values, 'column', where)
+    check_unit(values, role, where)
+    choice(values, 'remove_rest_offset', (True, False), where)
+    return Channel(**values)
+
+
+def check_unit(values: dict[str, Any], role: str, where: str) -> None:
+    """Check unit, scale and offset of a channel.
+
+    Raises:
+        InputError: no unit of the role, no numbers, or a scale of 0.
+    """
+    unit = values.get('unit')
+    if isinstance(unit, list):
+        raise InputError(f'{where}: unit is {brief(unit)}; write it without brackets')
+    of_file(role, str(unit) if unit else None, where)
     number(values, 'scale', where)
     number(values, 'offset', where)
     if values.get('scale') == 0.0:
         raise InputError(f'{where}: scale is 0; every value would be the same')
-    if not isinstance(values.get('remove_rest_offset', False), bool):
-        raise InputError(f'{where}: remove_rest_offset must be true or false')
-    return Channel(**values)
 
 
-def _column(value: object, where: str) -> None:
+def check_column(values: dict[str, Any], name: str, where: str) -> None:
+    """Hold an entry, where it is there, to the name of a column, or its number from 1.
+
+    Raises:
+        InputError: something else.
+    """
+    value = values.get(name, 1)
     if isinstance(value, bool) or not isinstance(value, (str, int)):
-        hint = f'; {_QUOTES}' if isinstance(value, list) else ''
-        raise InputError(f'{where}: column must be a name or a number, not {brief(value)}{hint}')
-    if isinstance(value, int) and value < 1:
-        raise InputError(f'{where}: columns are counted from 1, got {value}')
+        hint = f'; {QUOTES}' if isinstance(value, list) else ''
+        raise InputError(f'{where}: {name} must be a name or a number, not {brief(value)}{hint}')
+    if isinstance(value, int) and not 1 <= value <= MOST_COLUMNS:
+        raise InputError(
+            f'{where}: {name} is {value}; columns are counted from 1 to {MOST_COLUMNS}'
+        )

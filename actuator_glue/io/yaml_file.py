@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from reprlib import repr as brief
@@ -18,6 +19,9 @@ from actuator_glue.plain_yaml import plain_yaml
 
 LARGEST = 100_000  # bytes; a map or layout is a page of text
 _PACKAGE = Path(__file__).resolve().parent.parent
+# Inside {...} YAML reads the [s] of `column: Time [s]` as a list.
+_BRACKETS = re.compile(r'column:\s*[^\'"\s][^\'",}]*\[')
+QUOTES = "put quotes around names with brackets, as in column: 'Time [s]'"
 
 
 def shipped(folder: str) -> list[str]:
@@ -39,21 +43,34 @@ def located(given: Path | str, folder: str) -> Path:
     return path
 
 
-def read_text(path: Path, what: str, hint: str, folder: str) -> str:
-    """Return the text of a YAML file.
+def read_file(
+    given: Path | str, what: str, hint: str, folder: str, largest: int = LARGEST
+) -> tuple[Path, object]:
+    """Return a YAML file, there or of the package by its name, and what it says.
 
     Args:
-        path: the file.
-        what: what it is to be, for messages.
+        given: as `located`.
+        what: it is to be, for messages.
         hint: said where it is far too large for that.
         folder: of the package where such files are.
+        largest: bytes that are read.
+
+    Raises:
+        InputError: as `read_text` and `parse`.
+    """
+    path = located(given, folder)
+    return path, parse(read_text(path, what, hint, folder, largest), f'{path}: {what}')
+
+
+def read_text(path: Path, what: str, hint: str, folder: str, largest: int = LARGEST) -> str:
+    """Return the text of a YAML file; arguments as of `read_file`.
 
     Raises:
         InputError: no such file, too large, no text.
     """
     try:
         size = path.stat().st_size
-        if size > LARGEST:
+        if size > largest:
             raise InputError(f'{path}: {size / 1e3:.0f} kB are no {what}; {hint}')
         return path.read_text(text_encoding(path))
     except OSError as error:
@@ -66,13 +83,12 @@ def read_text(path: Path, what: str, hint: str, folder: str) -> str:
         raise InputError(f'{path}: {what} is not text in UTF-8') from error
 
 
-def parse(text: str, where: str, hint: str = '') -> object:
+def parse(text: str, where: str) -> object:
     """Return what YAML text says; only plain data, no objects.
 
     Args:
         text: the text.
         where: file and what it is to be, for messages.
-        hint: said behind the error.
 
     Raises:
         InputError: no YAML, or a key twice in one mapping.
@@ -84,13 +100,31 @@ def parse(text: str, where: str, hint: str = '') -> object:
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         # ValueError: a date such as 2001-99-99; RecursionError: a thousand brackets.
         detail = ' '.join(str(error).split())
+        hint = f'; {QUOTES}' if _BRACKETS.search(text) else ''
         raise InputError(f'{where} is not YAML ({detail}){hint}') from error
+
+
+def entries(content: object, known: Iterable[str], where: str) -> dict[str, Any]:
+    """Return the entries of a mapping that say something, all of which must be known.
+
+    Raises:
+        InputError: no mapping, or an unknown entry.
+    """
+    if not isinstance(content, Mapping):
+        raise InputError(f'{where} must be a mapping of names to values, not {brief(content)}')
+    known = [*known]
+    for name in content:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 1)
+            hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
+            raise InputError(f'{where}: unknown entry {name!r}; {hint}')
+    return {name: value for name, value in content.items() if value is not None}
 
 
 def mapping(
     content: object, kind: type, where: str, hidden: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """Return a mapping that has the fields of a dataclass, and only those.
+    """Return the entries of a mapping that has the fields of a dataclass, and only those.
 
     Args:
         content: what the YAML says.
@@ -101,19 +135,44 @@ def mapping(
     Raises:
         InputError: no mapping, an unknown or missing entry.
     """
-    if not isinstance(content, Mapping):
-        raise InputError(f'{where} must be a mapping of names to values, not {brief(content)}')
-    known = [f.name for f in fields(kind) if f.name not in hidden]
-    for name in content:
-        if name not in known:
-            near = difflib.get_close_matches(str(name), known, 1)
-            hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
-            raise InputError(f'{where}: unknown entry {name!r}; {hint}')
+    values = entries(content, (f.name for f in fields(kind) if f.name not in hidden), where)
     for entry in fields(kind):
-        plain = entry.default is MISSING and entry.default_factory is MISSING
-        if plain and content.get(entry.name) is None:
-            raise InputError(f'{where}: {entry.name} is missing')
-    return dict(content)
+        if entry.default is MISSING and entry.default_factory is MISSING:
+            needed(values, entry.name, where)
+    return values
+
+
+def needed(values: Mapping[str, Any], name: str, where: str) -> Any:
+    """Return an entry that must be there.
+
+    Raises:
+        InputError: it is not.
+    """
+    if name not in values:
+        raise InputError(f'{where}: {name} is missing')
+    return values[name]
+
+
+def choice(values: Mapping[str, Any], name: str, allowed: tuple[object, ...], where: str) -> None:
+    """Hold an entry, where it is there, to some values.
+
+    Raises:
+        InputError: another one.
+    """
+    if name in values and values[name] not in allowed:
+        listed = ', '.join(map(str, allowed))
+        raise InputError(f'{where}: {name} is {brief(values[name])}; use one of {listed}')
+
+
+def texts(values: Mapping[str, Any], names: tuple[str, ...], where: str) -> None:
+    """Hold entries, where they are there, to text.
+
+    Raises:
+        InputError: something else.
+    """
+    for name in names:
+        if not isinstance(values.get(name, ''), str):
+            raise InputError(f'{where}: {name} must be text, not {brief(values[name])}')
 
 
 def number(

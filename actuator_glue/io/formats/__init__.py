@@ -16,7 +16,7 @@ from typing import Any
 
 from actuator_glue import optional_library
 from actuator_glue.errors import InputError
-from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.channel_map import MOST_COLUMNS, ChannelMap
 from actuator_glue.io.signature import beginning, unmarked
 from actuator_glue.records import Array
 
@@ -24,8 +24,6 @@ from actuator_glue.records import Array
 LARGEST = 2 << 30
 # Values that are no numbers: so few are a remark, and no column.
 A_REMARK = 20
-# Columns that one file may have; a matrix with more is no list of channels.
-MOST_COLUMNS = 10_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.channel_map import MOST_COLUMNS, ChannelMap
 from actuator_glue.io.file_notes import nearly, of_groups, of_variable
 from actuator_glue.io.formats import (
     A_REMARK,
-    MOST_COLUMNS,
     Column,
     FileTable,
     Format,
