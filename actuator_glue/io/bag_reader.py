@@ -268,10 +268,19 @@ def decoded(
         if found.type in places:
             yield found.type, None
             continue
-        try:
-            yield found.type, deserialize(found.type, found.data, found.definition)
-        except InputError as error:
-            raise InputError(
-                f'{path}: topic {found.topic}: {error}; was it recorded with another version of '
-                'the messages?'
-            ) from error
+        yield found.type, content(found, path)
+
+
+def content(found: BagMessage, path: Path | str) -> Any:
+    """Return what a message of a bag says.
+
+    Raises:
+        InputError: its bytes are no message of its type.
+    """
+    try:
+        return deserialize(found.type, found.data, found.definition)
+    except InputError as error:
+        raise InputError(
+            f'{path}: topic {found.topic}: {error}; was it recorded with another version of the '
+            'messages?'
+        ) from error

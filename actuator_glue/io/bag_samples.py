@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from actuator_glue import sample_block
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import BagMessage, Summary
-from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.io.bag_reader import BagMessage, Summary, content
+from actuator_glue.io.messages import full_name
 from actuator_glue.records import check_period
 from actuator_glue.sample_block import Block, stamp_ns
 from actuator_glue.setups import StreamSetup, from_message
@@ -34,15 +34,6 @@ class BagSetup:
     setup: StreamSetup
 
 
-def _content(found: BagMessage, where: str) -> Any:
-    try:
-        return deserialize(found.type, found.data, found.definition)
-    except InputError as error:
-        raise InputError(
-            f'{where}: {error}; was it recorded with another version of the messages?'
-        ) from error
-
-
 def samples(found: BagMessage, path: Path | str) -> BagBlock:
     """Return a SampleBlock of a bag.
 
@@ -50,15 +41,14 @@ def samples(found: BagMessage, path: Path | str) -> BagBlock:
         InputError: bytes that are no such message, an absurd period, channels of different
             lengths.
     """
-    where = f'{path}: topic {found.topic}'
-    content = _content(found, where)
-    block = sample_block.from_message(content)
-    at = f'{where}: block at sample {block.index}'
+    said = content(found, path)
+    block = sample_block.from_message(said)
+    at = f'{path}: topic {found.topic}: block at sample {block.index}'
     check_period(block.period, at)
     channels = block.command, block.measured, block.force
     if len({len(channel) for channel in channels if channel is not None}) != 1:
         raise InputError(f'{at} has channels of different lengths')
-    return BagBlock(found.topic, content.header.frame_id, block)
+    return BagBlock(found.topic, said.header.frame_id, block)
 
 
 def setup(found: BagMessage, path: Path | str) -> BagSetup:
@@ -67,12 +57,11 @@ def setup(found: BagMessage, path: Path | str) -> BagSetup:
     Raises:
         InputError: bytes that are no such message, or an impossible stiffness, rate or hold.
     """
-    where = f'{path}: topic {found.topic}'
-    content = _content(found, where)
+    said = content(found, path)
     try:
-        return BagSetup(found.topic, stamp_ns(content.header), from_message(content))
+        return BagSetup(found.topic, stamp_ns(said.header), from_message(said))
     except InputError as error:
-        raise InputError(f'{where}: {error}') from None
+        raise InputError(f'{path}: topic {found.topic}: {error}') from None
 
 
 def topics_of_actuator(

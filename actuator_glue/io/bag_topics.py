@@ -11,7 +11,7 @@ from array import array
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
@@ -31,9 +31,27 @@ _STEP = re.compile(r'(\w+)(?:\[([^\]]+)\])?\.?')
 # Fields that hold a list of names: `name` of a JointState, `joint_names`, `labels`.
 _NAMES = re.compile(r'(^|_)(names?|labels?|ids?)$')
 _DEEPEST = 8  # messages in messages
-# A step into a message: field; element by number or name; for a name, how many levels up the list
-# of names is, and its field.
-_Step = tuple[str, int | str | None, int, str]
+
+
+class _Step(NamedTuple):
+    """A step into a message: a field, and which element of it where it is an array."""
+
+    field: str
+    key: int | str | None = None
+    # For an element by its name: how many levels up the list of names is, and its field.
+    up: int = 0
+    names: str = ''
+
+
+class _Place(NamedTuple):
+    """Where a number of a message is: the steps to it.
+
+    And the names of the elements that are taken by number, and the path by these names.
+    """
+
+    steps: list[_Step]
+    called: list[str]
+    by_name: str
 
 
 @dataclass(slots=True)
@@ -54,10 +72,8 @@ class TopicSeries:
     )
     columns: dict[str, array[float]] = field(default_factory=dict)
     _asked: bool = False
-    _steps: dict[str, list[_Step]] = field(default_factory=dict)
-    # For elements that are asked for by number: their names in the first message, and the path by
-    # these names.
-    _called: dict[str, tuple[list[str], str]] = field(default_factory=dict)
+    # Of each column, in the first message.
+    _places: dict[str, _Place] = field(default_factory=dict)
 
     def names(self) -> list[str]:
         """Return what a channel map calls the columns; the topic alone where there is but one."""
@@ -125,15 +141,13 @@ def _begin(series: TopicSeries, content: Any, wanted: Collection[str] | None) ->
     paths = offered = list(_numbers(content))
     if wanted is not None:
         asked = [n.removeprefix(f'{series.topic}.') for n in wanted]
-        paths = [path for path in asked if _resolved(content, path)]
+        paths = [path for path in asked if _place(content, path)]
         if series.topic in wanted and len(offered) == 1:
             paths = offered
         series._asked = bool(paths)
         paths = paths or offered  # to say what there is
-    for path in paths:
-        series.columns[path] = array('d')
-        series._steps[path] = _resolved(content, path) or []
-        series._called[path] = _by_number(content, path)
+    series._places = {path: place for path in paths if (place := _place(content, path))}
+    series.columns = {path: array('d') for path in series._places}
 
 
 def _append(series: TopicSeries, content: Any, message: BagMessage, path: Path | str) -> None:
@@ -148,10 +162,9 @@ def _append(series: TopicSeries, content: Any, message: BagMessage, path: Path |
     series.times['published'].append(message.publish_time)
     series.times['logged'].append(message.log_time)
     for name, values in list(series.columns.items()):
+        place = series._places[name]
         try:
-            values.append(float(_value(content, series._steps[name])))
-            if not series._asked:
-                continue
+            values.append(float(_value(content, place.steps)))
         except (IndexError, AttributeError, TypeError, ValueError) as error:
             if not series._asked:
                 del series.columns[name]
@@ -159,13 +172,12 @@ def _append(series: TopicSeries, content: Any, message: BagMessage, path: Path |
             raise InputError(
                 f'{path}: topic {series.topic}: message {len(values)} has no {name}'
             ) from error
-        called, by_name = series._called[name]
-        named = _by_number(content, name)[0] if called else []
-        if named and named != called:
+        now = _place(content, name) if series._asked and place.called else None
+        if now is not None and now.called and now.called != place.called:
             raise InputError(
-                f'{path}: topic {series.topic}: {name} is {called[-1]!r} in the first message and '
-                f'{named[-1]!r} in message {len(values) - 1}; choose the channel by its name: '
-                f'{series.topic}.{by_name}'
+                f'{path}: topic {series.topic}: {name} is {place.called[-1]!r} in the first '
+                f'message and {now.called[-1]!r} in message {len(values) - 1}; choose the channel '
+                f'by its name: {series.topic}.{place.by_name}'
             )
 
 
@@ -181,12 +193,8 @@ def _decoder(name: str, summary: Summary) -> Callable[[bytes], Any]:
     return lambda data: store.deserialize_cdr(data, name)
 
 
-def _numbers(content: Any) -> Iterator[str]:
+def _numbers(content: Any, prefix: str = '', above: tuple[Any, ...] = ()) -> Iterator[str]:
     """Yield the path of every number of a message; headers and longer arrays are none."""
-    yield from _within(content, '', ())
-
-
-def _within(content: Any, prefix: str, above: tuple[Any, ...]) -> Iterator[str]:
     levels = (*above, content)
     for name in getattr(content, '__dataclass_fields__', {}):
         value = getattr(content, name)
@@ -196,7 +204,7 @@ def _within(content: Any, prefix: str, above: tuple[Any, ...]) -> Iterator[str]:
         if isinstance(value, (int, float)):
             yield where
         elif is_dataclass(value) and len(levels) <= _DEEPEST:
-            yield from _within(value, f'{where}.', levels)
+            yield from _numbers(value, f'{where}.', levels)
         elif isinstance(value, (list, np.ndarray)) and 0 < len(value) <= _MOST_ELEMENTS:
             names = _names(levels, len(value))
             keys = [str(i) for i in range(len(value))] if names is None else names[2]
@@ -204,7 +212,7 @@ def _within(content: Any, prefix: str, above: tuple[Any, ...]) -> Iterator[str]:
                 yield from (f'{where}[{key}]' for key in keys)
             elif names and is_dataclass(value[0]) and len(levels) <= _DEEPEST:
                 for key, element in zip(keys, value, strict=True):
-                    yield from _within(element, f'{where}[{key}].', levels)
+                    yield from _numbers(element, f'{where}[{key}].', levels)
 
 
 def _names(levels: tuple[Any, ...], size: int) -> tuple[int, str, list[str]] | None:
@@ -222,10 +230,12 @@ def _names(levels: tuple[Any, ...], size: int) -> tuple[int, str, list[str]] | N
     return None
 
 
-def _resolved(content: Any, path: str) -> list[_Step] | None:
-    """Return the steps to a number of a message; None where there is none."""
+def _place(content: Any, path: str) -> _Place | None:
+    """Return where a number of a message is; None where there is none."""
     steps: list[_Step] = []
+    called: list[str] = []
     levels: tuple[Any, ...] = ()
+    by_name = ''
     if ''.join(match[0] for match in _STEP.finditer(path)) != path:
         return None
     for name, key in _STEP.findall(path):
@@ -233,22 +243,26 @@ def _resolved(content: Any, path: str) -> list[_Step] | None:
         if name not in getattr(content, '__dataclass_fields__', {}):
             return None
         content = getattr(content, name)
+        by_name += f'.{name}'
         if not key:
-            steps.append((name, None, 0, ''))
+            steps.append(_Step(name))
             continue
         if not isinstance(content, (list, np.ndarray)):
             return None
-        names = _names(levels, len(content))
+        up, field_of_names, names = _names(levels, len(content)) or (0, '', [])
         if key.isdigit() and int(key) < len(content):
-            steps.append((name, int(key), 0, ''))
-            content = content[int(key)]
-        elif names and key in names[2]:
-            steps.append((name, key, names[0], names[1]))
-            content = content[names[2].index(key)]
+            at = int(key)
+            steps.append(_Step(name, at))
+            called += names[at : at + 1]
+        elif key in names:
+            at = names.index(key)
+            steps.append(_Step(name, key, up, field_of_names))
         else:
             return None
+        content = content[at]
+        by_name += f'[{names[at] if names else key}]'
     number = isinstance(content, (int, float, np.number)) and not isinstance(content, bool)
-    return steps if number else None
+    return _Place(steps, called, by_name[1:]) if number else None
 
 
 def _value(content: Any, steps: list[_Step]) -> Any:
@@ -266,23 +280,3 @@ def _value(content: Any, steps: list[_Step]) -> Any:
         if key is not None:
             content = content[key]
     return content
-
-
-def _by_number(content: Any, path: str) -> tuple[list[str], str]:
-    """Return names of the elements that a path takes by number, and the path that names them."""
-    found: list[str] = []
-    levels: tuple[Any, ...] = ()
-    said = ''
-    for name, key in _STEP.findall(path):
-        levels = (*levels, content)
-        content = getattr(content, name)
-        said += f'.{name}'
-        if not key:
-            continue
-        names = _names(levels, len(content))
-        at = names[2].index(key) if names and not key.isdigit() else int(key)
-        if names and key.isdigit():
-            found.append(names[2][at])
-        said += f'[{names[2][at] if names else key}]'
-        content = content[at]
-    return found, said[1:]
