@@ -33,7 +33,7 @@ _NAMES = re.compile(r'(^|_)(names?|labels?|ids?)$')
 _DEEPEST = 8  # messages in messages
 
 
-class _Step(NamedTuple):
+class _FieldStep(NamedTuple):
     """A step into a message: a field, and which element of it where it is an array."""
 
     field: str
@@ -49,7 +49,7 @@ class _Place(NamedTuple):
     And the names of the elements that are taken by number, and the path by these names.
     """
 
-    steps: list[_Step]
+    steps: list[_FieldStep]
     called: list[str]
     by_name: str
 
@@ -232,7 +232,7 @@ def _names(levels: tuple[Any, ...], size: int) -> tuple[int, str, list[str]] | N
 
 def _place(content: Any, path: str) -> _Place | None:
     """Return where a number of a message is; None where there is none."""
-    steps: list[_Step] = []
+    steps: list[_FieldStep] = []
     called: list[str] = []
     levels: tuple[Any, ...] = ()
     by_name = ''
@@ -245,18 +245,18 @@ def _place(content: Any, path: str) -> _Place | None:
         content = getattr(content, name)
         by_name += f'.{name}'
         if not key:
-            steps.append(_Step(name))
+            steps.append(_FieldStep(name))
             continue
         if not isinstance(content, (list, np.ndarray)):
             return None
         up, field_of_names, names = _names(levels, len(content)) or (0, '', [])
         if key.isdigit() and int(key) < len(content):
             at = int(key)
-            steps.append(_Step(name, at))
+            steps.append(_FieldStep(name, at))
             called += names[at : at + 1]
         elif key in names:
             at = names.index(key)
-            steps.append(_Step(name, key, up, field_of_names))
+            steps.append(_FieldStep(name, key, up, field_of_names))
         else:
             return None
         content = content[at]
@@ -265,7 +265,7 @@ def _place(content: Any, path: str) -> _Place | None:
     return _Place(steps, called, by_name[1:]) if number else None
 
 
-def _value(content: Any, steps: list[_Step]) -> Any:
+def _value(content: Any, steps: list[_FieldStep]) -> Any:
     """Return the number at the end of some steps.
 
     Raises:
