@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import formats, writable
+from actuator_glue.io.whole_file import whole_file
 from actuator_glue.motion import METRES, MOTIONS, WRITTEN
 from actuator_glue.records import Array, Record
 
@@ -25,22 +23,6 @@ def _columns(record: Record, unit: str) -> dict[str, Array]:
     if record.force is not None:
         columns['force_Nm' if record.motion == 'deg' else 'force_N'] = record.force
     return columns
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """Yield a file beside `path` that is renamed to it once it is complete and on the disk."""
-    temporary = path.with_name(path.name + '.tmp')
-    try:
-        yield temporary
-        with temporary.open('rb') as written:
-            os.fsync(written.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def write(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
@@ -61,5 +43,5 @@ def write(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
     chosen = formats().get(path.suffix.lower(), formats()['.csv'])
     if chosen.write is None:
         raise InputError(f'{path}: {chosen.name} is only read; use one of {", ".join(writable())}')
-    with _whole(path) as temporary:
+    with whole_file(path) as temporary:
         chosen.write(temporary, _columns(record, unit), notes)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.whole_file import whole_file
 from actuator_glue.json_value import json_value
 
 
@@ -24,13 +25,12 @@ def write_json(content: dict[str, Any], out: str | None) -> None:
         sys.stdout.write(text)
         return
     path = Path(out)
-    temporary = path.with_name(path.name + '.tmp')
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists() and not path.is_file():  # a device or pipe stays what it is
             path.write_text(text, 'utf-8')
             return
-        temporary.write_text(text, 'utf-8')
-        temporary.replace(path)
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    with whole_file(path) as temporary:
+        temporary.write_text(text, 'utf-8')

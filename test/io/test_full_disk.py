@@ -14,6 +14,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import messages, summarise
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.json_file import write_json
 from actuator_glue.io.recover import recover
 from actuator_glue.records import Record
 
@@ -256,3 +257,18 @@ def test_a_read_only_disk_is_said(tmp_path: Path) -> None:
     except (OSError, subprocess.CalledProcessError) as error:
         pytest.skip(f'no mount namespaces here ({error})')
     assert 'the disk is read-only' in done.stdout
+
+
+def test_json_that_cannot_be_finished_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half of it stayed beside the name that was asked for."""
+
+    def full(file: Path, text: str, encoding: str) -> None:
+        file.write_bytes(text[:10].encode(encoding))
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(Path, 'write_text', full)
+    with pytest.raises(InputError, match=r'a\.json: cannot be written \(No space left'):
+        write_json({'one': 1}, str(tmp_path / 'a.json'))
+    assert not list(tmp_path.iterdir())
