@@ -120,7 +120,6 @@ class Metadata:
 
     topics: list[BagTopic] = field(default_factory=list)
     parts: list[BagFile] = field(default_factory=list)
-    custom: dict[str, str] = field(default_factory=dict)
     ros_distro: str = 'jazzy'
 
     def information(self) -> dict[str, Any]:
@@ -159,7 +158,7 @@ class Metadata:
                 }
                 for p in self.parts
             ],
-            'custom_data': self.custom or None,
+            'custom_data': None,
             'ros_distro': self.ros_distro,
         }
 

@@ -6,7 +6,6 @@ from array import array
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -239,13 +238,10 @@ def check_order(path: Path | str) -> None:
         InputError: the order differs; the message says what to do.
     """
     order = _Order(path)
-    for _ in order.seen(messages(path, types=TYPES, note=lambda _: None)):
+    for _ in order.seen(_again(path)):
         if order.mixed:
             break
-    if not order.mixed:
-        return
-    every = sorted(messages(path, types=TYPES, note=lambda _: None), key=attrgetter('log_time'))
-    if _counts_on(every, path):
+    if order.mixed and _by_time(path) is not None:
         raise InputError(
             f'{path}: its messages are not in the order of their times; put the samples in order '
             f'with `actuator-glue convert {path} OUT`'
@@ -262,24 +258,28 @@ def _setups(
     """
     order = _Order(path)
     setups = [*_usable(order.seen(messages(path, types=TYPES, note=note)), path, warn)]
-    again = partial(messages, path, types=TYPES, note=lambda _: None)
-    if order.mixed:
-        every = sorted(again(), key=attrgetter('log_time'))
-        if _counts_on(every, path):
-            return lambda: every, [*_usable(every, path, lambda _: None)]
-    return lambda: as_published(again()), setups
+    every = _by_time(path) if order.mixed else None
+    if every is not None:
+        return lambda: every, [*_usable(every, path, lambda _: None)]
+    return lambda: as_published(_again(path)), setups
 
 
-def _counts_on(every: Iterable[BagMessage], path: Path | str) -> bool:
-    """Whether the samples of each topic count on, as they do in the order of their times."""
+def _again(path: Path | str) -> Iterator[BagMessage]:
+    """Yield messages whose damage has been told."""
+    return messages(path, types=TYPES, note=lambda _: None)
+
+
+def _by_time(path: Path | str) -> list[BagMessage] | None:
+    """Return messages in the order of their times; None where samples do not count on in it."""
+    every = sorted(_again(path), key=attrgetter('log_time'))
     following: dict[str, int] = {}
     for raw in every:
         if raw.type == SAMPLE_BLOCK:
             block = bag_samples.samples(raw, path).block
             if block.index < following.get(raw.topic, 0):
-                return False
+                return None
             following[raw.topic] = block.index + len(block)
-    return True
+    return every
 
 
 def _usable(

@@ -48,7 +48,6 @@ class BagWriter:
         path: folder of the bag; must not exist.
         flush_period: longest time a message stays in the process [s].
         max_file_bytes: size at which the next file is begun.
-        custom: text kept in metadata.yaml under `custom_data`.
 
     Attributes:
         brought_back: files that were deleted while they were written.
@@ -64,10 +63,9 @@ class BagWriter:
         *,
         flush_period: float = FLUSH_PERIOD,
         max_file_bytes: int = MAX_FILE_BYTES,
-        custom: dict[str, str] | None = None,
     ) -> None:
         self.path = Path(path)
-        self.metadata = Metadata(custom=dict(custom or {}))
+        self.metadata = Metadata()
         self._flush_period = flush_period
         self._max_file_bytes = max_file_bytes
         self._topics: dict[str, BagTopic] = {}

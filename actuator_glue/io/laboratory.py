@@ -76,7 +76,6 @@ def read(
     channels: ChannelMap | Path | str | None = None,
     stiffness: float | None = None,
     hold: Hold | None = None,
-    actuator: str | None = None,
     resample: Resample | None = None,
     warn: Callable[[str], None] = warn_caller,
 ) -> Record:
@@ -88,7 +87,6 @@ def read(
             they are, as in `time_s,command_mm,measured_mm,force_N`.
         stiffness: specimen stiffness [N/m]; None for what map or file say.
         hold: how the command runs between its samples; None for what map or file say, else zoh.
-        actuator: name of the actuator; None for what map or file say.
         resample: samples per second [Hz] to which a jittered clock is made even; None where an
             uneven clock is refused. The record's source tells it, and its command runs straight
             between samples where nothing else is given. Band-limited; `(27.0, 'lines')` draws
@@ -135,7 +133,7 @@ def read(
         stiffness=found.stiffness if stiffness is None else stiffness,
         start_ns=max(found.start_ns + round(first * 1e9), 0),
         hold=chosen,
-        actuator=actuator or found.actuator,
+        actuator=found.actuator,
         source=source,
         motion=found.motion,
     )

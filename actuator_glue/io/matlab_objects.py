@@ -94,16 +94,14 @@ def _clocks(found: list[ObjectColumn]) -> list[ObjectColumn]:
     """Return the times of the columns as columns, those that several share once."""
     clocks: list[ObjectColumn] = []
     for each in found:
-        known = any(each.times is c.times or np.array_equal(each.values, c.values) for c in clocks)
-        if (
-            each.times is None
-            or known
-            or any(np.array_equal(each.times, c.values) for c in clocks)
+        times = each.times
+        if times is None or any(
+            np.array_equal(own, c.values) for own in (times, each.values) for c in clocks
         ):
             continue
         stem = each.column.name.rpartition('.')[0] or each.column.name
         column = Column(f'{stem}.Time', 'time' if not clocks else f'{stem}.Time', 's')
-        clocks.append(ObjectColumn(column, each.times, each.times))
+        clocks.append(ObjectColumn(column, times, times))
     return clocks
 
 

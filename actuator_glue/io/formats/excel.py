@@ -12,7 +12,6 @@ import zipfile
 from array import array
 from collections.abc import Iterable
 from datetime import UTC, datetime, time, timedelta
-from functools import partial
 from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -60,8 +59,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                 return FileTable(
                     columns,
                     _notes(chosen.above, path),
-                    partial(_chosen, table),
-                    entry=partial(_place, skip, columns),
+                    lambda places: [table[:, at] for at in places],
+                    entry=lambda row, at: f'row {skip + row + 1} of column {columns[at].name!r}',
                     told=_told([one.sheet.title for one in whole if _alike(one.columns, columns)]),
                 )
         finally:
@@ -221,14 +220,6 @@ def _numbers(rows: Iterable[tuple[Any, ...]], timed: list[bool], skip: int, path
     if not len(filled):
         raise InputError(f'{path}: no samples after the {skip} header rows')
     return table[: int(filled[-1]) + 1]  # formatted rows may follow
-
-
-def _place(skip: int, columns: list[Column], row: int, at: int) -> str:
-    return f'row {skip + row + 1} of column {columns[at].name!r}'
-
-
-def _chosen(table: Array, places: list[int]) -> list[Array]:
-    return [table[:, at] for at in places]
 
 
 def _number(value: Any) -> float:

@@ -322,12 +322,7 @@ def _plain(value: Any) -> str:
 
 
 def _unit(dataset: Any) -> str:
-    found = [_plain(dataset.attrs[name]) for name in _UNITS if name in dataset.attrs]
-    return found[0] if found else ''
-
-
-def _read(path: Path, channels: ChannelMap | None) -> FileTable:
-    return read_tree(path, channels)
+    return next((_plain(dataset.attrs[name]) for name in _UNITS if name in dataset.attrs), '')
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:
@@ -337,4 +332,4 @@ def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | f
         file.attrs.update(notes)
 
 
-FORMAT = Format(('.h5', '.hdf5'), _read, _write, _MAGIC, _NAME)
+FORMAT = Format(('.h5', '.hdf5'), read_tree, _write, _MAGIC, _NAME)

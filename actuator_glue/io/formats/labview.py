@@ -126,12 +126,11 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
 class _SegmentTimes(NamedTuple):
     """Times of a segment, in the unit of the file, and the time from which they count [ns].
 
-    And what a reader should know of them.
+    And what a reader should know of them. The start is 0 where no date says it.
     """
 
     times: Array
     start_ns: int
-    stamped: bool
     told: str
 
 
@@ -159,9 +158,8 @@ def _clock(
         _check_count(path, segment, shown)
         told = _checked_clock(path, said, segment, shown, own)
     if own[0] > _EPOCH:
-        return _SegmentTimes(own, -_EPOCH * 10**9, False, told)
-    start_ns = _stamp_ns(path, said, segment, shown)
-    return _SegmentTimes(own, start_ns, start_ns > 0, told)
+        return _SegmentTimes(own, -_EPOCH * 10**9, told)
+    return _SegmentTimes(own, _stamp_ns(path, said, segment, shown), told)
 
 
 def _check_count(path: Path, segment: _HeadedRows, shown: list[int]) -> None:
@@ -255,7 +253,7 @@ def _joined(path: Path, clocks: list[_SegmentTimes], scale: float) -> Array:
     for clock in clocks[1:]:
         times = clock.times
         if times[0] <= parts[-1][-1]:
-            if not clock.stamped or not clocks[0].stamped:
+            if clock.start_ns <= 0 or clocks[0].start_ns <= 0:
                 raise InputError(
                     f'{path}: several measurements in one file, each with times from its own '
                     'start, and no date says when that was; save each as a file of its own'
@@ -382,18 +380,12 @@ def _stamp_ns(path: Path, said: _Heading, segment: _HeadedRows, shown: list[int]
     """Return the date and time of the measurement [ns], taken as UTC: no zone is written."""
     date = _common(path, segment, 'Date', shown) or said.file.get('Date', '')
     clock = _common(path, segment, 'Time', shown) or said.file.get('Time', '')
-    numbers = re.fullmatch(
-        r'(\d{4})/(\d+)/(\d+) (\d+):(\d+):(\d+)(?:[.,](\d*))?', f'{date} {clock}'
-    )
-    if numbers is None:
-        return 0
-    *parts, fraction = numbers.groups()
+    text, _, fraction = f'{date} {clock}'.replace(',', '.').partition('.')
     try:
-        year, month, day, hour, minute, second = map(int, parts)
-        whole = datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
+        whole = datetime.strptime(text, '%Y/%m/%d %H:%M:%S').replace(tzinfo=UTC).timestamp()
+        return round(whole) * 10**9 + int(f'{fraction}000000000'[:9])
     except ValueError:
         return 0
-    return round(whole) * 10**9 + int(f'{fraction or ""}000000000'[:9])
 
 
 FORMAT = Format(('.lvm',), _read, None, b'LabVIEW Measurement', _NAME, text=True)

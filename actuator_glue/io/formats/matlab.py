@@ -78,18 +78,17 @@ def _plain(content: dict[str, Any]) -> FileTable:
             _collect(name, value, arrays, texts)
     columns: list[Column] = []
     places: list[tuple[str, int]] = []
-    unread = {}
-    for name in [name for name, array in arrays.items() if array.dtype.kind == 'c']:
-        del arrays[name]
-        unread[name.rpartition('.')[2]] = 'complex numbers'
-    for name, array in arrays.items():
-        found = matrix_columns(name, array.shape)
-        columns += found
-        places += [(name, i) for i in range(len(found))]
+    unread: dict[str, str] = {}
     named = ((name.rpartition('.')[2], text) for name, text in texts.items())
     notes = {name: text for name, text in named if of_variable(name, text, words=True)}
     for name, array in arrays.items():
         label = name.rpartition('.')[2]
+        if array.dtype.kind == 'c':
+            unread[label] = 'complex numbers'
+            continue
+        found = matrix_columns(name, array.shape)
+        columns += found
+        places += [(name, i) for i in range(len(found))]
         if array.size == 1 and of_variable(label, said := repr(float(array.flat[0])), words=False):
             notes[label] = said
 
