@@ -17,6 +17,7 @@ from actuator_glue.io.bag_reader import Note, refuse, summarise, warn_caller
 from actuator_glue.io.bag_topics import Stamps, TopicSeries, topic_series
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.laboratory import in_si
+from actuator_glue.io.resample import at_times
 from actuator_glue.records import Array, Hold, Record
 
 # A step of this many periods is a gap, whatever the clock does after it.
@@ -176,17 +177,17 @@ def _sampled(
     if not one_by_one:
         first = stretch[0]
         index = np.arange(int((stretch[1] - first) / period) + 1)
-    grid = first + period * index
+    grid = np.asarray(first + period * index, dtype=np.float64)
     raw: dict[str, Array] = {}
     slack = 1e-6 * period
     whole = np.ones(len(grid), dtype=bool)
     for role, (stamps, values) in cut.items():
         if one_by_one and (role == 'command' or np.array_equal(stamps, times)):
             raw[role] = values
-        elif role == 'command' and hold == 'zoh':
-            raw[role] = values[np.maximum(np.searchsorted(stamps, grid + slack, 'right') - 1, 0)]
-        else:
-            raw[role] = np.interp(grid, stamps, values)
+            continue
+        held = role == 'command' and hold == 'zoh'
+        raw[role] = at_times(stamps, values, grid, held=held)
+        if not held:
             whole &= (grid >= stamps[0] - slack) & (grid <= stamps[-1] + slack)
             warn(f'{where}: {role} is interpolated to the times of the samples')
     if not one_by_one:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,14 @@ def _float(text: str) -> float:
     return float(text.replace('D', 'E').replace('d', 'e'))
 
 
+def _row(line: str) -> list[float]:
+    """Return the numbers of a line; empty where it is not of numbers."""
+    try:
+        return [_float(v) for v in re.split(r'[,;\s]+', line.strip().strip(',;'))]
+    except ValueError:
+        return []
+
+
 def _plain(unit: str) -> str:
     """Return a unit as `_UNITS` has it: small, without brackets, powers and seconds in one way."""
     unit = unit.strip(' \t"\'[](){}.,;').lower().replace('²', '2').replace('⁻', '-')
@@ -143,19 +152,11 @@ def _listed(line: str) -> tuple[str, str]:
 
 def _is_table(text: str, period: float) -> bool:
     """Whether rows of a text that says its DT are a time and a value each."""
-    rows = []
-    for line in text.splitlines():
-        try:
-            row = [_float(v) for v in re.split(r'[,;\s]+', line.strip().strip(',;'))]
-        except ValueError:
-            continue
-        if len(row) != 2:
-            return False
-        rows.append(row)
-        if len(rows) == 3:
-            steps = np.diff([time for time, _ in rows])
-            return bool((np.abs(steps - period) <= _UNEVEN * period).all())
-    return False
+    first = [*islice(filter(None, map(_row, text.splitlines())), 3)]
+    if len(first) < 3 or any(len(row) != 2 for row in first):
+        return False
+    steps = np.diff([time for time, _ in first])
+    return bool((np.abs(steps - period) <= _UNEVEN * period).all())
 
 
 def _at2(path: Path, text: str, period: float) -> GroundMotion:
@@ -344,13 +345,10 @@ def _columns(path: Path, text: str, warn: Callable[[str], None]) -> GroundMotion
             heading.append(line.lstrip('#% \t'))
         if not line.strip() or comment:
             continue
-        try:
-            values = [_float(v) for v in re.split(r'[,;\s]+', line.strip().strip(',;'))]
-        except ValueError as error:
-            if rows:
-                raise InputError(
-                    f'{path}: line {number} is not numbers ({line.strip()!r})'
-                ) from error
+        values = _row(line)
+        if not values and rows:
+            raise InputError(f'{path}: line {number} is not numbers ({line.strip()!r})')
+        if not values:
             heading.append(line)
             continue
         if len(values) != 2:

@@ -16,7 +16,7 @@ from actuator_glue.given import one_of
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import ChannelMap, channel_map_given
 from actuator_glue.io.laboratory import Channels, channels_of
-from actuator_glue.io.resample import Resample, evenly, rate_and_way
+from actuator_glue.io.resample import Resample, at_times, evenly, rate_and_way
 from actuator_glue.records import Array, Hold, Record
 
 By: TypeAlias = Literal['time', 'correlation']
@@ -128,7 +128,7 @@ def join(
         )
     values = {r: v[inside] for r, v in response.values.items() if r in ('measured', 'force')}
     held = hold == 'zoh'
-    values['command'] = _at(passed, command.values['command'], at[inside], held)
+    values['command'] = at_times(passed, command.values['command'], at[inside], held=held)
     source = f'{response_file} (command of {Path(command_file).name})'
     values['time'] = times[1][inside]
     first = round((float(values['time'][0]) - float(times[1][0])) * 1e9)
@@ -179,14 +179,6 @@ def _part(path: Path | str, channels: ChannelMap | None, role: str) -> Channels:
 
 def _first_ns(part: Channels) -> int:
     return part.start_ns + round(float(part.values['time'][0]) * 1e9)
-
-
-def _at(time: Array, column: Array, at: Array, held: bool) -> Array:
-    if not held:
-        return np.asarray(np.interp(at, time, column))
-    # A stamp that is printed a little early is still that of its own sample.
-    before = np.searchsorted(time, at + 1e-6 * float(time[-1]) / len(time), side='right') - 1
-    return column[np.clip(before, 0, len(column) - 1)]
 
 
 def _by_time(command: Channels, response: Channels, where: str) -> tuple[float, str]:

@@ -242,6 +242,23 @@ def resample_evenly(
     )
 
 
+def at_times(time: Array, column: Array, at: Array, *, held: bool) -> Array:
+    """Return a channel at other times [s]: held from each sample to the next, or straight.
+
+    Args:
+        time: of its samples, going up, shape (n,).
+        column: shape (n,).
+        at: shape (m,).
+        held: whether a sample holds until the next one.
+    """
+    if not held:
+        return np.asarray(np.interp(at, time, column))
+    # A stamp that is printed a little early is still that of its own sample.
+    early = 1e-6 * float(time[-1] - time[0]) / len(time)
+    before = np.searchsorted(time, at + early, side='right') - 1
+    return column[np.clip(before, 0, len(column) - 1)]
+
+
 def _even_times(time: Array, rate: float) -> Array:
     return np.asarray(np.arange(int(time[-1] * rate * (1.0 + 1e-12)) + 1) / rate)
 

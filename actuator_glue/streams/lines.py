@@ -56,6 +56,13 @@ def sent_columns(layout: Layout) -> list[Field]:
     return [at.get(i, Field('unused')) for i in range(max(at) + 1)]
 
 
+def sent_values(field: Field, values: Mapping[str, Array]) -> Array:
+    """Return a column as it is sent, zeros for what is stepped over; `values` by field, in SI."""
+    if not field.role:
+        return np.zeros(len(values['command']))
+    return values['counter'] if field.name == 'counter' else field.sent(values[field.name])
+
+
 def label(field: Field) -> str:
     """Return the name of the column of a field that is sent."""
     return field.column if isinstance(field.column, str) else field.name
@@ -156,14 +163,10 @@ class Lines:
     def encoded(self, values: Mapping[str, Array]) -> list[bytes]:
         """Return one line per sample, without its end; fields in the layout's order."""
         columns: list[list[str]] = []
-        size = len(values['command'])
         for field in sent_columns(self._layout):
-            if not field.role:
-                columns.append(['0'] * size)
-            elif field.name == 'counter':
-                columns.append([str(int(v)) for v in values['counter']])
-            else:
-                columns.append([repr(float(v)) for v in field.sent(values[field.name])])
+            counts = field.name == 'counter' or not field.role
+            kind: type[int] | type[float] = int if counts else float
+            columns.append([repr(kind(v)) for v in sent_values(field, values)])
         delimiter = self._layout.delimiter
         return [delimiter.join(row).encode() for row in zip(*columns, strict=True)]
 

@@ -143,12 +143,12 @@ class _Tree:
         # Links to other files are never followed, external storage is never opened.
         if dataset.is_virtual or dataset.external or len(self.columns) > MOST_COLUMNS:
             return
-        if dataset.shape == ():
-            self._note(dataset, shown)
-        if not dataset.shape or _EMPTY in dataset.attrs:
+        if dataset.shape is None or _EMPTY in dataset.attrs:
             return  # what MATLAB stores of [] is its shape
         if dataset.size <= 1000:
             self._note(dataset, shown)
+        if not dataset.shape:
+            return
         fields = dataset.dtype.names
         if self._matlab and 'ref' in (dataset.dtype.metadata or {}):
             few = dataset.size <= MOST_COLUMNS and depth < _DEEPEST

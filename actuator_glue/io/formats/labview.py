@@ -138,11 +138,11 @@ def _clock(
     path: Path, said: _Heading, number: int, head: TextHead, times: list[int], shown: list[int]
 ) -> _SegmentTimes:
     segment, told = said.segments[number], ''
+    _check_count(path, segment, shown)
     if said.file.get('X_Columns', 'One').lower() == 'no':
         period = _number(path, segment, 'Delta_X', shown)
         first = _number(path, segment, 'X0', shown)
         own = first + period * np.arange(segment.rows, dtype=np.float64)
-        _check_count(path, segment, shown)
     elif not times:
         raise InputError(
             f'{path}: X_Columns is {said.file.get("X_Columns", "One")}, but no column is called '
@@ -155,7 +155,6 @@ def _clock(
                 f'{path}: the channels have times of their own, and they differ; bring them to '
                 'common times, and save them with one X column'
             )
-        _check_count(path, segment, shown)
         told = _checked_clock(path, said, segment, shown, own)
     if own[0] > _EPOCH:
         return _SegmentTimes(own, -_EPOCH * 10**9, told)

@@ -63,8 +63,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         notes |= _texts(file.properties)
         for group in file.groups():
             for channel in group.channels():
-                if channel.data_type is None or not _is_number(channel):
-                    if channel.data_type is not None and len(channel) > A_REMARK:
+                if channel.data_type is None:
+                    continue
+                if np.dtype(channel.dtype).kind not in 'fiuM':
+                    if len(channel) > A_REMARK:
                         unread[channel.name] = channel.data_type.__name__
                     continue
                 # A value takes at least a byte of the file: a channel claiming more is damaged.
@@ -79,7 +81,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     label, unit = bare(label), 's'
                     stamps.add(len(columns))
                 columns.append(Column(name, label, unit, scaling(channel.properties)))
-                clock, fault, doubt = _whole(_clock(channel), said.get(channel.path, []))
+                last = of_properties(channel.name, channel.properties, len(channel))
+                clock, fault, doubt = _whole(last, said.get(channel.path, []))
                 clocks.append(clock)
                 broken.append(fault)
                 doubts.append(doubt)
@@ -223,17 +226,8 @@ def _ahead(one: WaveformClock, other: WaveformClock) -> float:
     return passed + other.offset - one.offset
 
 
-def _clock(channel: Any) -> WaveformClock:
-    """Return the times of a channel, as LabVIEW's waveforms have them."""
-    return of_properties(channel.name, channel.properties, len(channel))
-
-
 def _texts(properties: Mapping[str, Any]) -> dict[str, str]:
     return {str(name): str(value) for name, value in properties.items()}
-
-
-def _is_number(channel: Any) -> bool:
-    return bool(np.dtype(channel.dtype).kind in 'fiuM')
 
 
 def _values(channel: Any, path: Path) -> Array:

@@ -14,7 +14,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 from actuator_glue.streams.address import Address
 from actuator_glue.streams.layout import Rows
-from actuator_glue.streams.lines import label, places, sent_columns
+from actuator_glue.streams.lines import label, places, sent_columns, sent_values
 from actuator_glue.streams.transports import AT_ONCE, Terms, Transport, no_seal, samples
 
 # How long `send` waits for somebody to listen [s]: discovery takes a second or two.
@@ -140,14 +140,7 @@ class LslSender:
     def send(self, values: Mapping[str, Array]) -> int:
         """Send consecutive samples as one chunk."""
         size = len(values['command'])
-        columns = []
-        for field in self._columns:
-            if not field.role:
-                columns.append(np.zeros(size))
-            elif field.name == 'counter':
-                columns.append(values['counter'].astype(np.float64))
-            else:
-                columns.append(field.sent(values[field.name]))
+        columns = [sent_values(field, values) for field in self._columns]
         if not self._sent:
             self._start = self._clock() - (size - 1) * self._period
         self._sent += size
