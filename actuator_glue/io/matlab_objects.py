@@ -29,6 +29,9 @@ _DEEPEST = 32  # objects in objects
 _NAME = 'objects of MATLAB'
 # Parts of a path that say nothing: `logsout.Storage_.Elements{1}.Values` is logsout{1} to people.
 _SILENT = ('Storage_', 'Storage', 'Elements', 'Elements_', 'Values')
+# Where variables have names that are no identifiers: `Command [mm]`, of which `varnames` makes
+# `Command_mm_`.
+_OWN_NAMES = ('variablenames2048', 'varnames2048', 'variablenamesoriginal', 'varnamesorig')
 _SECONDS = {
     'nanoseconds': 1e-9,
     'microseconds': 1e-6,
@@ -172,16 +175,17 @@ def _timeseries(
 
 def _table(properties: dict[str, Any]) -> dict[str, Any] | None:
     """Return what a table or timetable holds, by lower-case names; None where it is none."""
-    inner = properties.get('any')
-    if isinstance(inner, np.ndarray) and inner.dtype.names and inner.size == 1:
-        properties = {name: inner.flat[0][name] for name in inner.dtype.names}
+    for inner in (properties.get('any'), properties.get('props')):
+        if isinstance(inner, np.ndarray) and inner.dtype.names and inner.size == 1:
+            properties = {**properties, **{n: inner.flat[0][n] for n in inner.dtype.names}}
     lower = {name.lower(): value for name, value in properties.items()}
     return lower if {'data', 'varnames'} <= set(lower) else None
 
 
 def _variables(name: str, table: dict[str, Any]) -> list[ObjectColumn]:
-    names = [_text(entry) for entry in np.ravel(table['varnames'])]
-    units = [_text(entry) for entry in np.ravel(_units(table))]
+    own = (table[n] for n in _OWN_NAMES if n in table and np.any(table.get(f'use{n}', False)))
+    names = [_text(entry) for entry in np.ravel(next(own, table['varnames']))]
+    units = [_text(e) for e in np.ravel(_first(table, 'varunits', 'variableunits', default=()))]
     units += [''] * (len(names) - len(units))
     times = _row_times(table)
     found = []
@@ -194,13 +198,6 @@ def _variables(name: str, table: dict[str, Any]) -> list[ObjectColumn]:
     if times is None:
         return found
     return [replace(c, times=times) for c in found if len(c.values) == len(times)]
-
-
-def _units(table: dict[str, Any]) -> Any:
-    found = table.get('varunits')
-    if found is None and isinstance(props := table.get('props'), np.ndarray) and props.dtype.names:
-        found = props.flat[0]['VariableUnits'] if 'VariableUnits' in props.dtype.names else None
-    return () if found is None else found
 
 
 def _row_times(table: dict[str, Any]) -> Array | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from matio import save_to_mat
+from matio import load_from_mat, save_to_mat
 from matio.utils.matclass import MatlabOpaque
 
 from actuator_glue.errors import InputError
@@ -120,6 +120,38 @@ def test_timetable_and_table(tmp_path: Path, version: str) -> None:
     with warnings.catch_warnings(action='ignore'):
         save_to_mat(str(tmp_path / 'b.mat'), {'tt': rows}, version=version)
     check(read(tmp_path / 'b.mat'))
+
+
+@pytest.mark.parametrize('version', VERSIONS)
+@pytest.mark.parametrize('timed', [True, False])
+def test_names_of_variables_that_are_no_identifiers(
+    tmp_path: Path, version: str, timed: bool
+) -> None:
+    """MATLAB keeps them beside identifiers that it makes of them, which say no unit."""
+    columns = {'Command [mm]': COMMAND, 'Measured [mm]': MEASURED}
+    index = pd.to_timedelta(1e9 * TIME, unit='ns').astype('timedelta64[us]')
+    frame = pd.DataFrame(columns, index=index) if timed else pd.DataFrame(columns)
+    if timed:
+        frame.index.name = 'Time'
+    else:
+        frame['Time [s]'] = TIME
+    path = saved(tmp_path / 'a.mat', version, t=frame)
+    table = load_from_mat(str(path), raw_data=True)['t']
+    held = table.properties['any'] if timed else table.properties['props']
+    own, use = (
+        ('varNamesOrig', 'useVarNamesOrig')
+        if timed
+        else (
+            'VariableNamesOriginal',
+            'useVariableNamesOriginal',
+        )
+    )
+    names, place = ('varNames', held[0, 0]) if timed else ('varnames', table.properties)
+    held[0, 0][own], held[0, 0][use] = place[names], np.array([[True]])
+    made = np.empty(place[names].shape, dtype=object)
+    made[0, :] = [f'variable_{i}' for i in range(made.size)]
+    place[names] = made
+    check(read(saved(path, version, t=table)))
 
 
 @pytest.mark.parametrize('version', VERSIONS)
