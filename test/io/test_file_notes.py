@@ -6,6 +6,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import openpyxl
+import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, GroupObject, TdmsWriter
 from scipy.io import savemat
@@ -323,3 +325,16 @@ def test_variables_are_notes_whatever_their_capitals(tmp_path: Path, name: str) 
     own = {'Hold': '5 s', 'hold_mode': 'displacement', 'stiffness': 3.0, 'HOLD_TIME': 5.0}
     record = read(variables(path, **own))
     assert (record.hold, record.stiffness) == ('zoh', None)
+
+
+def test_attributes_of_a_dataframe_are_notes(tmp_path: Path) -> None:
+    """As pandas writes them into Parquet; whatever else is called so is none."""
+    frame, path = pd.DataFrame(COLUMNS), tmp_path / 'a.parquet'
+    frame.attrs = {'hold': 'linear', 'stiffness_N_per_m': 250e3, 'operator': 'nobody'}
+    frame.to_parquet(path)
+    record = read(path)
+    assert (record.hold, record.stiffness) == ('linear', 250e3)
+    table = pq.read_table(path)
+    for odd in ('[1, 2]', '{broken'):
+        pq.write_table(table.replace_schema_metadata({'PANDAS_ATTRS': odd}), path)
+        assert (read(path).hold, read(path).stiffness) == ('zoh', None)

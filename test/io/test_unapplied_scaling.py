@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
+from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.laboratory import read
 
@@ -108,3 +109,16 @@ def test_a_convention_is_no_doubt(tmp_path: Path) -> None:
     record = read(hdf5(tmp_path, {'scale_factor': 2.5}), warn=told.append)
     assert not told
     assert np.allclose(record.measured, 2.5e-3 * COLUMNS['measured_mm'])
+
+
+@WRITERS
+@pytest.mark.parametrize('name', ['unit', 'units', 'Unit', 'Units', 'unit_string'])
+def test_a_unit_is_read_whatever_its_attribute_is_called(
+    tmp_path: Path, write: Writer, name: str
+) -> None:
+    """Each format knew its own name of it, and passed over the others."""
+    with pytest.raises(InputError, match="'mm' in its name, and the file gives 'V' as its unit"):
+        read(write(tmp_path, {name: 'V'}))
+    for same in ('mm', 'none', ''):
+        record = read(write(tmp_path, {name: same}))
+        assert np.allclose(record.measured, 1e-3 * COLUMNS['measured_mm'])

@@ -14,6 +14,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from actuator_glue import optional_library
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import MOST_COLUMNS, ChannelMap
@@ -24,6 +26,8 @@ from actuator_glue.records import Array
 LARGEST = 2 << 30
 # Values that are no numbers: so few are a remark, and no column.
 A_REMARK = 20
+# Under which attribute a channel has its unit, the last as LabVIEW writes it.
+UNIT_NAMES = ('unit', 'units', 'Unit', 'Units', 'unit_string')
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +161,18 @@ def check_size(size: int, path: Path) -> None:
             f'{path}: {size / 1e9:.3g} GB of numbers, {LARGEST / 1e9:.3g} GB at most are read; '
             'cut the record into parts'
         )
+
+
+def unit_of(attributes: Mapping[str, Any]) -> str:
+    """Return the unit that attributes of a channel say; empty where they say none."""
+    return next((plain_text(attributes[n]) for n in UNIT_NAMES if n in attributes), '')
+
+
+def plain_text(value: Any) -> str:
+    """Return an attribute as text: bytes decoded, a number in full."""
+    if isinstance(value, bytes):
+        return value.decode('utf-8', 'replace')
+    return repr(float(value)) if isinstance(value, np.number) else str(value)
 
 
 def matrix_columns(

@@ -15,6 +15,7 @@ from actuator_glue.io.channel_map import MOST_COLUMNS, ChannelMap
 from actuator_glue.io.file_notes import nearly, of_groups, of_variable
 from actuator_glue.io.formats import (
     A_REMARK,
+    UNIT_NAMES,
     Column,
     FileTable,
     Format,
@@ -22,7 +23,9 @@ from actuator_glue.io.formats import (
     library,
     matrix_column,
     matrix_columns,
+    plain_text,
     reading,
+    unit_of,
 )
 from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.waveforms import (
@@ -43,7 +46,6 @@ _FIELDS = ('data', 'values', 'value')
 _NAMES = ('name', 'label')
 _NAME = 'an HDF5 file'
 _PACKING = ('scale_factor', 'add_offset')  # of netCDF, and applied
-_UNITS = ('unit', 'units', 'Unit', 'Units', 'unit_string')
 
 
 def is_hdf5(path: Path) -> bool:
@@ -83,7 +85,7 @@ def read_tree(
         file.visititems(tree.visit)
         notes, told = of_groups(tree.groups)
         tree.notes = notes | tree.notes
-        tree.notes |= {n: _plain(file.attrs[n]) for n in file.attrs if nearly(n)}
+        tree.notes |= {n: plain_text(file.attrs[n]) for n in file.attrs if nearly(n)}
     if not tree.columns and not matlab:
         raise InputError(f'{path}: no numeric vector or matrix in this file')
     columns = named_by_structs(tree.columns, tree.texts)
@@ -135,7 +137,7 @@ class _Tree:
 
     def visit(self, name: str, found: Any) -> None:
         """Take what lies under a name; MATLAB's own group `#refs#` is left out."""
-        self.groups.append({n: _plain(found.attrs[n]) for n in found.attrs if nearly(n)})
+        self.groups.append({n: plain_text(found.attrs[n]) for n in found.attrs if nearly(n)})
         if not name.startswith('#') and hasattr(found, 'shape'):
             self._take(name, found, name.replace('/', '.') if self._matlab else name, 0)
 
@@ -166,7 +168,7 @@ class _Tree:
         elif dataset.dtype.kind in 'fiu' and not (_is_text(dataset) or _OBJECT in dataset.attrs):
             shape = dataset.shape[::-1] if self._matlab else dataset.shape
             said = scaling(dataset.attrs, _PACKING)
-            found = matrix_columns(shown, shape, _unit(dataset), said)
+            found = matrix_columns(shown, shape, unit_of(dataset.attrs), said)
             self.columns += found
             self.places += [(place, i) for i in range(len(found))]
             self.clocks += [_clock(column.name, dataset) for column in found]
@@ -211,7 +213,7 @@ def _clock(name: str, dataset: Any) -> WaveformClock:
             said |= {key: value} if isinstance(value, (int, float, np.number)) else {}
             continue
         with suppress(ValueError):
-            said[key] = np.datetime64(_plain(value).removesuffix('Z'), 'us')
+            said[key] = np.datetime64(plain_text(value).removesuffix('Z'), 'us')
     return of_properties(name, said, max(dataset.shape))
 
 
@@ -262,7 +264,7 @@ def named_by_structs(columns: list[Column], texts: dict[str, str]) -> list[Colum
         struct, _, field = column.name.rpartition('.')
         if struct and field.lower() in _FIELDS:
             label = next(filter(None, (told.get(f'{struct}.{n}'.lower()) for n in _NAMES)), '')
-            unit = next(filter(None, (told.get(f'{struct}.{n}'.lower()) for n in _UNITS)), '')
+            unit = next(filter(None, (told.get(f'{struct}.{n}'.lower()) for n in UNIT_NAMES)), '')
             column = replace(column, label=label or column.label, unit=column.unit or unit)
         out.append(column)
     return out
@@ -274,7 +276,7 @@ def _unpacked(values: Any, attributes: Any) -> Array:
     Raises:
         ValueError: a factor or a fill value that is no number.
     """
-    if _plain(attributes.get('_Unsigned', '')).lower() == 'true' and values.dtype.kind == 'i':
+    if plain_text(attributes.get('_Unsigned', '')).lower() == 'true' and values.dtype.kind == 'i':
         values = values.view(values.dtype.str.replace('i', 'u'))
     missing = np.zeros(values.shape, dtype=bool)
     for name in ('_FillValue', 'missing_value'):
@@ -304,7 +306,7 @@ def _valid(attributes: Any, kind: np.dtype[Any]) -> tuple[float, float]:
 
 
 def _is_text(dataset: Any) -> bool:
-    return bool(_plain(dataset.attrs.get(_CLASS, '')) == 'char')
+    return bool(plain_text(dataset.attrs.get(_CLASS, '')) == 'char')
 
 
 def _text(dataset: Any) -> str:
@@ -312,17 +314,7 @@ def _text(dataset: Any) -> str:
     values = dataset[()]
     if _is_text(dataset):
         return ''.join(chr(c) for c in values.flat)
-    return _plain(np.asarray(values).flat[0])
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, bytes):
-        return value.decode('utf-8', 'replace')
-    return repr(float(value)) if isinstance(value, np.number) else str(value)
-
-
-def _unit(dataset: Any) -> str:
-    return next((_plain(dataset.attrs[name]) for name in _UNITS if name in dataset.attrs), '')
+    return plain_text(np.asarray(values).flat[0])
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from actuator_glue.io.formats import (
     check_size,
     library,
     reading,
+    unit_of,
 )
 from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.units import bare
@@ -41,7 +44,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             f'{path}: {rows} rows in all, but its {len(told)} row groups hold {sum(told)}: this '
             'Parquet file is damaged; copy it again from where it was written'
         )
-    notes = _texts(schema.metadata)
+    notes = _notes(_texts(schema.metadata))
     fields = [field for field in schema if _is_number(field.type)]
     if not fields:
         raise InputError(f'{path}: no column of numbers in this Parquet file')
@@ -57,6 +60,14 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     # A column of nothing has no type.
     unread = {name: kind for name, kind in unread.items() if kind != 'null'}
     return FileTable([_column(f) for f in fields], notes, values, unread=unread)
+
+
+def _notes(metadata: dict[str, str]) -> dict[str, str]:
+    """Return what a file says besides: its own metadata, and `DataFrame.attrs` of pandas."""
+    with suppress(ValueError, AttributeError):  # whatever else stands under that name
+        attributes = json.loads(metadata.get('PANDAS_ATTRS', '{}'))
+        metadata = {name: str(value) for name, value in attributes.items()} | metadata
+    return metadata
 
 
 def _is_number(kind: Any) -> bool:
@@ -78,7 +89,7 @@ def _column(field: Any) -> Column:
         # Its type says its unit, whatever `time_ns` may say.
         return Column(field.name, bare(field.name), 's')
     said = _texts(field.metadata)
-    return Column(field.name, field.name, said.get('unit', ''), scaling(said))
+    return Column(field.name, field.name, unit_of(said), scaling(said))
 
 
 def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:

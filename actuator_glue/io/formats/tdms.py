@@ -21,6 +21,7 @@ from actuator_glue.io.formats import (
     check_size,
     library,
     reading,
+    unit_of,
 )
 from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.units import bare
@@ -75,7 +76,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                         f'{path}: damaged: {channel.path} claims {len(channel)} values'
                     )
                 name, label = f'{group.name}/{channel.name}', channel.name
-                unit = str(channel.properties.get('unit_string', ''))
+                unit = unit_of(channel.properties)
                 if np.dtype(channel.dtype).kind == 'M':
                     # Its type says its unit, whatever `time_ns` may say.
                     label, unit = bare(label), 's'
