@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from rosbags.interfaces import QosDurability, QosHistory, QosLiveliness, QosReliability
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.disk_room import reserve
@@ -45,12 +46,15 @@ class Qos:
 
 LATCHED = Qos(durability='transient_local')
 
-# Numbers of the policies in rmw, which bags before version 9 (before Jazzy) hold.
+# By the number of each in rmw, which bags before version 9 (before Jazzy) hold.
 _POLICIES = {
-    'history': ('system_default', 'keep_last', 'keep_all', 'unknown'),
-    'reliability': ('system_default', 'reliable', 'best_effort', 'unknown', 'best_available'),
-    'durability': ('system_default', 'transient_local', 'volatile', 'unknown', 'best_available'),
-    'liveliness': ('system_default', 'automatic', 'manual_by_node', 'manual_by_topic', 'unknown'),
+    name: [policy.name.lower() for policy in kind]
+    for name, kind in (
+        ('history', QosHistory),
+        ('reliability', QosReliability),
+        ('durability', QosDurability),
+        ('liveliness', QosLiveliness),
+    )
 }
 
 

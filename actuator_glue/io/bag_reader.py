@@ -196,21 +196,20 @@ def messages(
 
 
 def as_published(found: Iterable[BagMessage]) -> Iterator[BagMessage]:
-    """Yield messages with each test set-up before the samples that were published after it.
+    """Yield recorded messages with each set-up before the samples published after it.
 
     Topics have no order among each other: a recorder that stalls may take samples first. Within a
     topic the recorded order stays, whatever a clock did. Bags without times of publication come
     as they are.
-
-    Args:
-        found: messages in the order they were recorded.
     """
     waiting: deque[BagMessage] = deque()
     try:
         for message in found:
             place = len(waiting)
             if message.type == TEST_SETUP:
-                while place and _is_later(waiting[place - 1], message):
+                while place and (before := waiting[place - 1]).type != TEST_SETUP:
+                    if before.publish_time <= message.publish_time:
+                        break
                     place -= 1
             waiting.insert(place, message)
             if len(waiting) > WAITING:
@@ -219,10 +218,6 @@ def as_published(found: Iterable[BagMessage]) -> Iterator[BagMessage]:
         yield from waiting
         raise
     yield from waiting
-
-
-def _is_later(message: BagMessage, setup: BagMessage) -> bool:
-    return message.type != TEST_SETUP and message.publish_time > setup.publish_time
 
 
 def summarise(path: Path | str) -> Summary:

@@ -171,7 +171,10 @@ def read_records(
     done.extend(segment for segment in open_segments.values() if segment is not None)
     long_enough = [segment for segment in done if len(segment.command) >= 2]
     records = [
-        segment.record(_source(path, segment.topic, len(open_segments), i, len(long_enough)))
+        segment.record(
+            (f'{path}:{segment.topic}' if len(open_segments) > 1 else str(path))
+            + (f' (record {i} of {len(long_enough)})' if len(long_enough) > 1 else '')
+        )
         for i, segment in enumerate(long_enough, start=1)
     ]
     if not records:
@@ -193,11 +196,6 @@ def _publishers(path: Path | str, every: Iterable[BagMessage], topic: str) -> Pu
         if raw.topic == topic:
             found.take(bag_samples.samples(raw, path).block)
     return found
-
-
-def _source(path: Path | str, topic: str, topics: int, number: int, records: int) -> str:
-    name = f'{path}:{topic}' if topics > 1 else str(path)
-    return f'{name} (record {number} of {records})' if records > 1 else name
 
 
 def without_samples(path: Path | str) -> str:

@@ -206,8 +206,10 @@ def _by_time(command: Channels, response: Channels, where: str) -> tuple[float, 
     late = _late(command, response, 'command', 'measured', between)
     if late is None or not np.isfinite(late.deviation) or late.explained < _EXPLAINED:
         return between, 'joined by their times'
-    told = f'joined by their times, by which {_said(late)} of the response are dead time'
-    return between, f'{told} (standard deviation)'
+    return between, (
+        f'joined by their times, by which {1e3 * late.seconds:.3g} +- {_milli(late.deviation)} ms '
+        'of the response are dead time (standard deviation)'
+    )
 
 
 def _by_correlation(command: Channels, response: Channels, where: str) -> tuple[float, str]:
@@ -216,7 +218,8 @@ def _by_correlation(command: Channels, response: Channels, where: str) -> tuple[
     Raises:
         InputError: not alike, or alike at several places.
     """
-    shared = next((r for r in ('command', 'measured') if _both(command, response, r)), None)
+    both = command.values.keys() & response.values.keys()
+    shared = next((r for r in ('command', 'measured') if r in both), None)
     roles = (shared, shared) if shared else ('command', 'measured')
     coarse = _coarse(command, response, *roles, where)
     late = _late(command, response, *roles, coarse, same=shared is not None)
@@ -234,14 +237,6 @@ def _by_correlation(command: Channels, response: Channels, where: str) -> tuple[
             'clocks, and is not known from these files'
         )
     return seconds, told
-
-
-def _both(one: Channels, other: Channels, role: str) -> bool:
-    return role in one.values and role in other.values
-
-
-def _said(late: _Late) -> str:
-    return f'{1e3 * late.seconds:.3g} +- {_milli(late.deviation)} ms'
 
 
 def _milli(seconds: float) -> str:

@@ -46,11 +46,7 @@ def load(
         InputError: the file cannot be used, or holds several records.
     """
     found = load_records(
-        path,
-        stiffness=stiffness,
-        channels=channels,
-        hold=hold,
-        resample=resample,
+        path, stiffness=stiffness, channels=channels, hold=hold, resample=resample
     )
     if len(found) > 1:
         raise InputError(f'{path} holds {len(found)} records; `load_records` returns them all')
@@ -114,14 +110,9 @@ def load_records(
                 raise InputError(f'{path}: bags count their samples; only files are resampled')
             groups.append(_of_bag(path, channels, note, gap, warn))
             continue
-        record = laboratory.read(
-            path,
-            channels=channels,
-            hold=hold,
-            resample=resample,
-            warn=warn,
+        groups.append(
+            [laboratory.read(path, channels=channels, hold=hold, resample=resample, warn=warn)]
         )
-        groups.append([record])
     records = [record for group in groups for record in group]
     for record in records:
         record.check_scale()

@@ -236,7 +236,7 @@ def resample_evenly(
         late=float(np.std(time - time[0] - even)) if len(even) else 0.0,
         clock=clock,
         jitter=jitter,
-        moved=jitter * _speed(taken, channels['measured']),
+        moved=jitter * _rms(_unlike(taken, channels['measured'])[1]),
         cut=cut,
         finer=finer,
     )
@@ -289,7 +289,7 @@ def _cut(time: Array, command: Array, rate: float) -> tuple[float, float]:
         return 0.0, 0.0
     ends = curve(at)
     middle = curve(at[:-1] + 0.5 / rate) - 0.5 * (ends[:-1] + ends[1:])
-    missed = _OF_MIDDLE * float(np.sqrt(np.mean(middle**2)))
+    missed = _OF_MIDDLE * _rms(middle)
     share = missed / (_STRAIGHT * max(float(np.std(command)), 1e-300))
     if share <= 1.0:
         return 0.0, 0.0
@@ -415,8 +415,7 @@ def _repeated(time: Array, rate: float, where: str) -> tuple[float, str]:
 def _smooth(time: Array, column: Array) -> float:
     if np.diff(time).min() <= 0.0:
         return np.inf
-    left, _ = _unlike(time, column)
-    return float(np.sqrt(np.mean(left**2)))
+    return _rms(_unlike(time, column)[0])
 
 
 def _jitter(time: Array, column: Array) -> float:
@@ -433,13 +432,12 @@ def _jitter(time: Array, column: Array) -> float:
     return jitter if share > _FELT and jitter > _EXACT * step else 0.0
 
 
-def _speed(time: Array, column: Array) -> float:
-    """Return the root mean square of the velocity [unit/s]."""
-    return float(np.sqrt(np.mean(_unlike(time, column)[1] ** 2)))
-
-
 def _left_out(time: Array, column: Array) -> float:
     """Return the root mean square of each sample against the line between its neighbours."""
     weight = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     line = (1.0 - weight) * column[:-2] + weight * column[2:]
-    return float(np.sqrt(np.mean((column[1:-1] - line) ** 2)))
+    return _rms(column[1:-1] - line)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

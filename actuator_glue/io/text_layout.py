@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats.delimited import (
     DELIMITERS,
-    TextHead,
     fields_of,
     is_number,
     is_remark,
@@ -66,8 +65,10 @@ def text_layout(path: Path) -> TextLayout:
     # A wrong delimiter leaves entries that are no numbers.
     best = max(found, key=lambda rows: 2 * len(rows.numbers) - rows.filled)
     blocks, follows = _blocks(path, best, is_timed=False)
-    if follows and _is_timed(read_head(path, blocks[0].lines)):
-        blocks, follows = _blocks(path, best, is_timed=True)
+    if follows:
+        head = read_head(path, blocks[0].lines)
+        if head.stamps or any(bare(name) == 'time' for name in head.names):
+            blocks, follows = _blocks(path, best, is_timed=True)
     chosen = max(blocks, key=lambda block: block.rows)
     entries: dict[str, Any] = {'header_lines': chosen.lines}
     if follows:
@@ -76,10 +77,6 @@ def text_layout(path: Path) -> TextLayout:
     if best.delimiter is not None and best.delimiter != read.delimiter:
         entries['delimiter'] = best.delimiter
     return TextLayout(entries, best.numbers, blocks)
-
-
-def _is_timed(head: TextHead) -> bool:
-    return bool(head.stamps) or any(bare(name) == 'time' for name in head.names)
 
 
 def _blocks(path: Path, like: _Rows, *, is_timed: bool) -> tuple[list[SampleRows], bool]:

@@ -48,6 +48,8 @@ _BRACKETS = re.compile(r'[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]')
 _WHOLE = re.compile(r'^[\[(]+\s*([^\[\]()]*?)\s*[\])]+$')  # all in brackets
 _OF_MATRIX = re.compile(r'\((?::,\d+|\d+,:)\)\s*$')  # which column of a matrix, as MATLAB says it
 _MOVING = ('command', 'measured')
+# What else than its own quantity a file may have for a role, and factors to what stands for it.
+_OTHER = {role: {u: f for u, (_, f) in MOTIONS.items()} for role in _MOVING} | {'force': TORQUES}
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
 _KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values()) - set(_LONG)
 _LOWER = {unit.lower() for unit in _KNOWN}
@@ -160,23 +162,14 @@ def factor(role: str, unit: str | None, where: str) -> float:
     return known[unit]
 
 
-def _converts(role: str, unit: str) -> bool:
-    """Whether `of_file` accepts a unit."""
-    other = MOTIONS if role in _MOVING else TORQUES if role == 'force' else {}
-    return unit in ROLES[role] or unit in other
-
-
 def of_file(role: str, unit: str | None, where: str) -> float:
     """Return the factor from a unit of a file to SI, or to the unit used for it in a record.
 
     Raises:
         InputError: as `factor`; units of another motion or of a torque are accepted.
     """
-    if role in _MOVING and unit in MOTIONS:
-        return MOTIONS[unit][1]
-    if role == 'force' and unit in TORQUES:
-        return TORQUES[unit]
-    return factor(role, unit, where)
+    other = _OTHER.get(role, {})
+    return other[unit] if unit in other else factor(role, unit, where)
 
 
 def common_motion(units: dict[str, str], where: str) -> str:
@@ -380,7 +373,8 @@ def choose(
     found: dict[str, tuple[int, str]] = {}
     for role, columns in called.items():
         # Beside `command_mm` another quantity is none: `command_velocity_mm_s`.
-        able = [(at, unit) for at, unit in columns if not unit or _converts(role, symbol(unit))]
+        known = {*ROLES[role], *_OTHER.get(role, ())}
+        able = [(at, unit) for at, unit in columns if not unit or symbol(unit) in known]
         (position, unit), *others = able or columns
         name, stated = names[position].strip(), units[position]
         if others:

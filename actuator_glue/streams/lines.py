@@ -128,7 +128,8 @@ class Lines:
                         why = str(error)
             if why:
                 bad += 1
-                self._tell(line, why)
+                shown = line[:60].decode('utf-8', 'replace').strip()
+                self.odd = f'the last one is {shown!r}: {why}'
         table = np.array(rows, dtype=np.float64).reshape(len(rows), len(self._layout.fields))
         fields = self._places or self._layout.fields
         return dict(zip(fields, table.T, strict=False)), bad
@@ -148,10 +149,6 @@ class Lines:
         row = [_number(entries[place], name) for name, place in at.items()]
         self._width = len(entries)
         return row
-
-    def _tell(self, line: bytes, why: str) -> None:
-        shown = line[:60].decode('utf-8', 'replace').strip()
-        self.odd = f'the last one is {shown!r}: {why}'
 
     def _entries(self, line: bytes) -> list[str]:
         """Return the entries of a line; an empty one behind the last delimiter is none."""

@@ -40,6 +40,10 @@ class _Sheet(NamedTuple):
     columns: list[Column]
     timed: set[int]
 
+    def like(self, other: _Sheet) -> bool:
+        """Whether they have a name in common: the numbers of a map fit any sheet."""
+        return not {c.name for c in self.columns}.isdisjoint(c.name for c in other.columns)
+
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     openpyxl = library('openpyxl', path)
@@ -61,7 +65,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     _notes(chosen.above, path),
                     lambda places: [table[:, at] for at in places],
                     entry=lambda row, at: f'row {skip + row + 1} of column {columns[at].name!r}',
-                    told=_told([one.sheet.title for one in whole if _alike(one.columns, columns)]),
+                    told=_told([one.sheet.title for one in whole if chosen.like(one)]),
                 )
         finally:
             book.close()
@@ -90,11 +94,6 @@ def _holds(columns: list[Column], channels: ChannelMap | None) -> bool:
     labels: set[str | int] = {name for c in columns for name in (c.name, c.label)}
     wanted = {channel.column for channel in channels.roles().values()}
     return wanted <= labels.union(range(1, len(columns) + 1))
-
-
-def _alike(one: list[Column], other: list[Column]) -> bool:
-    """Whether two sheets have a name in common: the numbers of a map fit any sheet."""
-    return not {c.name for c in one}.isdisjoint(c.name for c in other)
 
 
 def _told(sheets: list[str]) -> tuple[str, ...]:
@@ -213,7 +212,7 @@ def _numbers(rows: Iterable[tuple[Any, ...]], timed: list[bool], skip: int, path
     """
     read, width = array('d'), len(timed)
     for row in rows:
-        cells = [_seconds(v) if t else _number(v) for v, t in zip(row, timed, strict=False)]
+        cells = [_number(v, timed=t) for v, t in zip(row, timed, strict=False)]
         read.extend(cells + [math.nan] * (width - len(cells)))
     table = np.frombuffer(read).reshape(-1, width)
     (filled,) = np.nonzero((~np.isnan(table)).any(axis=1))
@@ -222,11 +221,10 @@ def _numbers(rows: Iterable[tuple[Any, ...]], timed: list[bool], skip: int, path
     return table[: int(filled[-1]) + 1]  # formatted rows may follow
 
 
-def _number(value: Any) -> float:
-    return float(value) if _is_number(value) else math.nan
-
-
-def _seconds(value: Any) -> float:
+def _number(value: Any, *, timed: bool) -> float:
+    """Return a number, or seconds of what is a time; NaN for what is neither."""
+    if not timed:
+        return float(value) if _is_number(value) else math.nan
     if isinstance(value, datetime):
         return value.replace(tzinfo=UTC).timestamp()
     if isinstance(value, time):  # of a day
