@@ -84,43 +84,31 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             parts[0] if len(parts) == 1 else [np.concatenate(c) for c in zip(*parts, strict=True)]
         )
 
-    def entry(row: int, at: int) -> str:
-        part = 0
-        while part < len(heads) - 1 and row >= said.segments[part].rows:
-            row -= said.segments[part].rows
-            part += 1
-        return entry_at(path, heads[part], row, at)
-
     counted = said.file.get('X_Columns', 'One').lower() == 'no'
     unit = 's' if counted else _common(path, said.segments[0], 'X_Unit_Label', shown) or 's'
     clocks = [_clock(path, said, i, heads[i], times, shown) for i in range(len(heads))]
-    start_ns = clocks[0].start_ns
+    start_ns, period, clock = clocks[0].start_ns, None, clocks[0].times
+    places: list[int | None] = [*shown]
     if counted and len(clocks) == 1:
         period = _number(path, said.segments[0], 'Delta_X', shown)
-        first = round(float(clocks[0].times[0]) * 1e9)
-        return FileTable(
-            columns,
-            {},
-            lambda at: values([shown[i] for i in at]),
-            period,
-            start_ns + first,
-            lambda row, at: entry(row, shown[at]),
-        )
-    clock = _joined(path, clocks, ROLES['time'].get(unit, 1.0))
+        start_ns += round(float(clock[0]) * 1e9)
+    else:
+        clock = _joined(path, clocks, ROLES['time'].get(unit, 1.0))
+        columns, places = [Column(_TIMES, 'time', unit), *columns], [None, *shown]
 
     def with_times(at: list[int]) -> list[Array]:
-        read = iter(values([shown[i - 1] for i in at if i] or [shown[0]]))
-        return [next(read) if i else clock for i in at]
+        read = iter(values([place for i in at if (place := places[i]) is not None] or shown[:1]))
+        return [clock if places[i] is None else next(read) for i in at]
 
-    return FileTable(
-        [Column(_TIMES, 'time', unit), *columns],
-        {},
-        with_times,
-        None,
-        start_ns,
-        lambda row, at: entry(row, shown[at - 1] if at else (times or shown)[0]),
-        told=tuple(dict.fromkeys(c.told for c in clocks if c.told)),
-    )
+    def entry(row: int, at: int) -> str:
+        place, part = places[at], 0
+        while part < len(heads) - 1 and row >= said.segments[part].rows:
+            row -= said.segments[part].rows
+            part += 1
+        return entry_at(path, heads[part], row, (times or shown)[0] if place is None else place)
+
+    told = tuple(dict.fromkeys(c.told for c in clocks if c.told))
+    return FileTable(columns, {}, with_times, period, start_ns, entry, told=told)
 
 
 class _SegmentTimes(NamedTuple):
