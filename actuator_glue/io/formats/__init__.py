@@ -14,8 +14,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from actuator_glue import optional_library
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import MOST_COLUMNS, ChannelMap
@@ -26,8 +24,6 @@ from actuator_glue.records import Array
 LARGEST = 2 << 30
 # Values that are no numbers: so few are a remark, and no column.
 A_REMARK = 20
-# Under which attribute a channel has its unit, the last as LabVIEW writes it.
-UNIT_NAMES = ('unit', 'units', 'Unit', 'Units', 'unit_string')
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +35,7 @@ class Column:
         label: what it is called without the place where it lies, e.g. `command_mm`.
         unit: what the file gives as its unit beside the name; empty where it says nothing.
         scaling: what the file says of a gain or an offset that is not applied
-            (unapplied_scaling.py); empty where it says nothing.
+            (channel_attributes.py); empty where it says nothing.
     """
 
     name: str
@@ -161,18 +157,6 @@ def check_size(size: int, path: Path) -> None:
             f'{path}: {size / 1e9:.3g} GB of numbers, {LARGEST / 1e9:.3g} GB at most are read; '
             'cut the record into parts'
         )
-
-
-def unit_of(attributes: Mapping[str, Any]) -> str:
-    """Return the unit that attributes of a channel say; empty where they say none."""
-    return next((plain_text(attributes[n]) for n in UNIT_NAMES if n in attributes), '')
-
-
-def plain_text(value: Any) -> str:
-    """Return an attribute as text: bytes decoded, a number in full."""
-    if isinstance(value, bytes):
-        return value.decode('utf-8', 'replace')
-    return repr(float(value)) if isinstance(value, np.number) else str(value)
 
 
 def matrix_columns(

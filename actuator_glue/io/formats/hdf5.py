@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.channel_attributes import UNIT_NAMES, plain_text, scaling, unit_of
 from actuator_glue.io.channel_map import MOST_COLUMNS, ChannelMap
 from actuator_glue.io.file_notes import nearly, of_groups, of_variable
 from actuator_glue.io.formats import (
     A_REMARK,
-    UNIT_NAMES,
     Column,
     FileTable,
     Format,
@@ -23,11 +23,8 @@ from actuator_glue.io.formats import (
     library,
     matrix_column,
     matrix_columns,
-    plain_text,
     reading,
-    unit_of,
 )
-from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.waveforms import (
     PROPERTIES,
     WaveformClock,

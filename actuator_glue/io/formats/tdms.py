@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.channel_attributes import scaling, unit_of
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.file_notes import of_groups
 from actuator_glue.io.formats import (
@@ -21,9 +22,7 @@ from actuator_glue.io.formats import (
     check_size,
     library,
     reading,
-    unit_of,
 )
-from actuator_glue.io.unapplied_scaling import scaling
 from actuator_glue.io.units import bare
 from actuator_glue.io.waveforms import (
     PROPERTIES,

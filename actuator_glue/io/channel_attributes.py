@@ -1,4 +1,4 @@
-"""Gains and offsets that a file states beside its numbers, and that nobody applies."""
+"""What attributes of a channel say: its unit, and gains and offsets, which nobody applies."""
 
 from __future__ import annotations
 
@@ -10,12 +10,26 @@ import numpy as np
 
 from actuator_glue.io.noted_rate import plain
 
+# Under which attribute a channel has its unit, the last as LabVIEW writes it.
+UNIT_NAMES = ('unit', 'units', 'Unit', 'Units', 'unit_string')
 # Names of what numbers may have to be multiplied by, and of what may have to be added.
 _GAIN = re.compile(
     r'(?:(?:cal|calib|calibration|scal(?:e|ing)|conversion|channel)_?)?'
     r'(?:gain|factor|scal(?:e|ing)|slope|multiplier|coefficient)|calibration_constant'
 )
 _OFFSET = re.compile(r'(?:(?:add|cal|calibration|scal(?:e|ing)|channel)_?)?(?:offset|intercept)')
+
+
+def unit_of(attributes: Mapping[str, Any]) -> str:
+    """Return the unit that attributes of a channel say; empty where they say none."""
+    return next((plain_text(attributes[n]) for n in UNIT_NAMES if n in attributes), '')
+
+
+def plain_text(value: Any) -> str:
+    """Return an attribute as text: bytes decoded, a number in full."""
+    if isinstance(value, bytes):
+        return value.decode('utf-8', 'replace')
+    return repr(float(value)) if isinstance(value, np.number) else str(value)
 
 
 def scaling(attributes: Mapping[str, Any], applied: tuple[str, ...] = ()) -> str:
