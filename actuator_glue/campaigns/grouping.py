@@ -15,10 +15,11 @@ from typing import Any
 
 from actuator_glue.campaigns.recipe import SAID, FileRule, Recipe, channels_of
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import Note, is_bag
+from actuator_glue.io.bag_reader import is_bag
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.io.formats import formats
 from actuator_glue.io.load import load_records
+from actuator_glue.io.remarks import Note
 from actuator_glue.records import Record, check_hold, check_stiffness, source_names
 
 # How many names a message lists.

@@ -13,10 +13,11 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import near_whole_rate
-from actuator_glue.io.bag_reader import Note, refuse, summarise, warn_caller
+from actuator_glue.io.bag_reader import summarise
 from actuator_glue.io.bag_topics import Stamps, TopicSeries, topic_series
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.laboratory import in_si
+from actuator_glue.io.remarks import Note, refuse, warn_caller
 from actuator_glue.io.resample import at_times
 from actuator_glue.records import Array, Hold, Record
 

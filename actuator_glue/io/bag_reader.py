@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import inspect
 import re
-import warnings
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
 from actuator_glue.io.bag_metadata import BagFile, BagTopic
 from actuator_glue.io.mcap_scan import COMPRESSED, Scan, plain
 from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.io.remarks import Note, refuse
 
-Note = Callable[[str], None]
 TEST_SETUP = full_name('TestSetup')
 # Messages held back for a set-up recorded late: as many as sample blocks may wait on their topic.
 WAITING = 2000
@@ -55,18 +53,6 @@ class Summary:
     parts: list[BagFile] = field(default_factory=list)
     finished: bool = True
     damage: list[str] = field(default_factory=list)
-
-
-def refuse(message: str) -> NoReturn:
-    """Raise a note: the default for damage, unless the caller passes over it."""
-    raise InputError(message)
-
-
-def warn_caller(message: str) -> None:
-    """Warn of a note, at the line of the caller's own code: the default for what is told."""
-    package = f'{Path(__file__).parents[1]}/'
-    own = (i for i, f in enumerate(inspect.stack(0), 1) if not f.filename.startswith(package))
-    warnings.warn(message, stacklevel=next(own, 1))
 
 
 def is_bag(path: Path | str) -> bool:

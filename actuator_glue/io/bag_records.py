@@ -17,19 +17,11 @@ from actuator_glue.errors import InputError
 from actuator_glue.io import bag_samples
 from actuator_glue.io.bag_metadata import LATCHED
 from actuator_glue.io.bag_publishers import Publishers
-from actuator_glue.io.bag_reader import (
-    TEST_SETUP,
-    BagMessage,
-    Note,
-    as_published,
-    messages,
-    refuse,
-    summarise,
-    warn_caller,
-)
+from actuator_glue.io.bag_reader import TEST_SETUP, BagMessage, as_published, messages, summarise
 from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
+from actuator_glue.io.remarks import Note, refuse, warn_caller
 from actuator_glue.motion import METRES
 from actuator_glue.records import Record, same_period
 from actuator_glue.sample_block import Block

@@ -18,7 +18,8 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import BagMessage, Note, Summary, messages, refuse
+from actuator_glue.io.bag_reader import BagMessage, Summary, messages
+from actuator_glue.io.remarks import Note, refuse
 from actuator_glue.records import Array
 from actuator_glue.sample_block import stamp_ns
 

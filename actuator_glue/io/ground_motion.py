@@ -8,7 +8,6 @@ that are no unit say none.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
 
@@ -17,7 +16,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.given import path as path_given
 from actuator_glue.hybrid.ground_motion import GroundMotion, artificial
-from actuator_glue.io.bag_reader import warn_caller
+from actuator_glue.io.remarks import Note, warn_caller
 from actuator_glue.io.signature import text_encoding
 from actuator_glue.io.units import ROLES, is_unit, symbol
 from actuator_glue.records import Array
@@ -65,9 +64,7 @@ _DIRECTION = re.compile(
 )
 
 
-def read_ground_motion(
-    given: Path | str, warn: Callable[[str], None] = warn_caller
-) -> GroundMotion:
+def read_ground_motion(given: Path | str, warn: Note = warn_caller) -> GroundMotion:
     """Return the ground motion of a file, or an artificial one.
 
     Args:
@@ -277,7 +274,7 @@ def _pair(line: str) -> tuple[str, str] | None:
     return (match[1], match[2].strip()) if match is not None else None
 
 
-def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple[float, float]:
+def _units(path: Path, heading: list[str], warn: Note) -> tuple[float, float]:
     """Return the factors of time to s and of acceleration to m/s^2 that a table's heading says.
 
     Raises:
@@ -335,7 +332,7 @@ def _units(path: Path, heading: list[str], warn: Callable[[str], None]) -> tuple
     return next(iter(seconds), 1.0), next(iter(factors.values()), 1.0)
 
 
-def _columns(path: Path, text: str, warn: Callable[[str], None]) -> GroundMotion:
+def _columns(path: Path, text: str, warn: Note) -> GroundMotion:
     """Return a table's: time and acceleration."""
     rows: list[list[float]] = []
     heading: list[str] = []

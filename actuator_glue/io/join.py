@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias, get_args
@@ -13,9 +12,9 @@ from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.given import one_of
-from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import ChannelMap, channel_map_given
 from actuator_glue.io.laboratory import Channels, channels_of
+from actuator_glue.io.remarks import Note, warn_caller
 from actuator_glue.io.resample import Resample, at_times, evenly, rate_and_way
 from actuator_glue.records import Array, Hold, Record
 
@@ -75,7 +74,7 @@ def join(
     stiffness: float | None = None,
     hold: Hold | None = None,
     resample: Resample | None = None,
-    warn: Callable[[str], None] = warn_caller,
+    warn: Note = warn_caller,
 ) -> Record:
     """Return the record of a test whose command is in one file and whose response in another.
 

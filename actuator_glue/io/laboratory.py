@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -13,11 +13,11 @@ import numpy as np
 from actuator_glue.clock_check import APART, disagreement, rate_by_clock
 from actuator_glue.errors import InputError
 from actuator_glue.given import path as path_given
-from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import Channel, ChannelMap, channel_map_given
 from actuator_glue.io.file_notes import noted
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.noted_rate import noted_rates
+from actuator_glue.io.remarks import Note, warn_caller
 from actuator_glue.io.resample import Resample, evenly, rate_and_way
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.units import (
@@ -77,7 +77,7 @@ def read(
     stiffness: float | None = None,
     hold: Hold | None = None,
     resample: Resample | None = None,
-    warn: Callable[[str], None] = warn_caller,
+    warn: Note = warn_caller,
 ) -> Record:
     """Return the record of a laboratory file.
 

@@ -15,9 +15,10 @@ from actuator_glue.given import one_of, one_thing
 from actuator_glue.given import path as path_given
 from actuator_glue.io import laboratory
 from actuator_glue.io.bag_mapped import read_mapped
-from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
+from actuator_glue.io.bag_reader import is_bag
 from actuator_glue.io.bag_records import read_records
 from actuator_glue.io.channel_map import ChannelMap, channel_map_given
+from actuator_glue.io.remarks import Note, refuse, warn_caller
 from actuator_glue.io.resample import Resample
 from actuator_glue.records import Hold, Record, check_stiffness
 

@@ -13,17 +13,11 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import (
-    BagMessage,
-    Note,
-    as_published,
-    messages,
-    refuse,
-    summarise,
-)
+from actuator_glue.io.bag_reader import BagMessage, as_published, messages, summarise
 from actuator_glue.io.bag_records import without_samples
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.io.remarks import Note, refuse
 from actuator_glue.motion import METRES
 from actuator_glue.sample_block import Block, check_times, from_message
 from actuator_glue.setups import known_stiffness

@@ -21,7 +21,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 
-from actuator_glue.io.bag_reader import decoded, refuse
+from actuator_glue.io.bag_reader import decoded
+from actuator_glue.io.remarks import refuse
 
 RATE = 200.0
 # Estimator settings for short tests at RATE.

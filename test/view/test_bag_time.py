@@ -10,8 +10,8 @@ import pytest
 from rosbags.interfaces import Nodetype
 
 from actuator_glue.io import messages
-from actuator_glue.io.bag_reader import Note, refuse
 from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.remarks import Note, refuse
 from actuator_glue.view.frames import Wanted, frame
 from actuator_glue.view.history import ROWS
 from actuator_glue.view.intake import Intake, read_bag

@@ -1,0 +1,26 @@
+"""What is told beside a record: raised, warned of, or handed to whoever asked for it."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn, TypeAlias
+
+from actuator_glue.errors import InputError
+
+# Takes one line.
+Note: TypeAlias = Callable[[str], None]
+
+
+def refuse(message: str) -> NoReturn:
+    """Raise a note: the default for damage, unless the caller passes over it."""
+    raise InputError(message)
+
+
+def warn_caller(message: str) -> None:
+    """Warn of a note, at the line of the caller's own code: the default for what is told."""
+    package = f'{Path(__file__).parents[1]}/'
+    own = (i for i, f in enumerate(inspect.stack(0), 1) if not f.filename.startswith(package))
+    warnings.warn(message, stacklevel=next(own, 1))
