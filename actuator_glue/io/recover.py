@@ -57,11 +57,16 @@ def recover(path: Path | str) -> Recovery:
             raise InputError(f'{file} is compressed as a whole; unpack it first (zstd -d)')
         if in_use(file):
             raise InputError(f'{file} is being recorded; stop the recorder first')
-    recovery = Recovery()
-    metadata = Metadata()
+    recovery, metadata = Recovery(), Metadata()
     topics: dict[str, BagTopic] = {}
     for file in bag_files(path, recovery.notes.append):
-        _mend(file, path, recovery, metadata, topics)
+        summary = mend(file, path)
+        recovery.notes += summary.damage
+        metadata.parts += summary.parts
+        for topic in summary.topics.values():
+            topics.setdefault(topic.name, replace(topic, count=0)).count += topic.count
+        if _is_cut(summary):
+            recovery.rewritten.append(file.name)
     metadata.topics = list(topics.values())
     metadata.parts = [part for part in metadata.parts if part.count]
     if not metadata.parts:
@@ -83,36 +88,27 @@ def recover(path: Path | str) -> Recovery:
     return recovery
 
 
-def mend(file: Path, bag: Path) -> None:
-    """Write a cut file of a bag anew from what is whole in it.
+def mend(file: Path, bag: Path) -> Summary:
+    """Write a file of a bag anew where it is cut or damaged; return what is whole in it.
 
     Raises:
         InputError: no room.
     """
-    _mend(file, bag, Recovery(), Metadata(), {})
-
-
-def _mend(
-    file: Path, bag: Path, recovery: Recovery, metadata: Metadata, topics: dict[str, BagTopic]
-) -> None:
     summary = Summary()
-    damage: list[str] = []
-    for _ in messages(file, types=(), note=damage.append, summary=summary):
+    for _ in messages(file, types=(), note=summary.damage.append, summary=summary):
         pass
-    recovery.notes.extend(damage)
-    part = summary.parts[0]
-    for topic in summary.topics.values():
-        known = topics.setdefault(topic.name, replace(topic, count=0))
-        known.count += topic.count
-    if part.count:
-        metadata.parts.append(part)
-        if damage or not summary.finished:
-            own = Metadata(list(summary.topics.values()), [part])
-            _rewrite(file, bag, summary, own)
-            recovery.rewritten.append(file.name)
+    if _is_cut(summary):
+        own = Metadata(list(summary.topics.values()), summary.parts)
+        _rewrite(file, bag, own)
+    return summary
 
 
-def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
+def _is_cut(summary: Summary) -> bool:
+    """Whether a file of which something is whole has to be written anew."""
+    return bool(summary.parts[0].count and (summary.damage or not summary.finished))
+
+
+def _rewrite(file: Path, bag: Path, own: Metadata) -> None:
     """Write a file anew from its whole messages and put it in the old one's place."""
     temporary = file.with_name(file.name + '.tmp')
     with suppress(FileNotFoundError):
