@@ -12,15 +12,10 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def reserve(file: int, start: int, length: int) -> None:
-    """Have the disk keep room for a part of a file; truncating the file gives it back.
+    """Have the disk keep room for bytes of an open file; truncating the file gives it back.
 
     Python's `os.posix_fallocate` would fill the file with zeros, which a killed process leaves.
     A file system that cannot reserve says so when it is written.
-
-    Args:
-        file: descriptor.
-        start: first byte of the part.
-        length: its bytes.
 
     Raises:
         OSError: the disk or the quota has no room (ENOSPC, EDQUOT).

@@ -173,11 +173,7 @@ def of_file(role: str, unit: str | None, where: str) -> float:
 
 
 def common_motion(units: dict[str, str], where: str) -> str:
-    """Return the motion of command and measured: metres, or another that both share.
-
-    Args:
-        units: by role, as `of_file` takes them.
-        where: file, for messages.
+    """Return the motion of units by role: metres, or another that command and measured share.
 
     Raises:
         InputError: two that differ, or a torque where nothing turns.

@@ -44,12 +44,8 @@ class Address:
 def parse_address(text: str, schemes: Sequence[str]) -> Address:
     """Return the address that `udp://HOST:PORT` or `lsl:NAME` says.
 
-    Args:
-        text: the address.
-        schemes: those that are possible here.
-
     Raises:
-        InputError: another scheme, no host, no port.
+        InputError: a scheme that is not possible here, no host, no port.
     """
     forms = ', '.join('lsl:NAME' if s == 'lsl' else f'{s}://HOST:PORT' for s in schemes)
     scheme, colon, rest = text.partition(':')

@@ -71,9 +71,6 @@ def label(field: Field) -> str:
 class Lines:
     """Lines of one layout; `begin` before the first of a connection.
 
-    Args:
-        layout: what a line holds.
-
     Attributes:
         by_name: a column is found by its name: the first line has to name them.
         odd: what the last line that cannot be read is, and what was expected; empty without one.

@@ -13,11 +13,7 @@ SHORTEST, LONGEST = 16, 4096  # bytes of a key
 
 
 class Seal:
-    """Signs and checks messages.
-
-    Args:
-        key: secret that sender and receiver share.
-    """
+    """Signs and checks messages by a key that sender and receiver share."""
 
     def __init__(self, key: bytes) -> None:
         self._key = key

@@ -448,12 +448,7 @@ def fields_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def read_columns(path: Path, head: TextHead, positions: list[int]) -> list[Array]:
-    """Return columns of numbers, each of shape (n,); what is no number there is NaN.
-
-    Args:
-        path: the file.
-        head: its head.
-        positions: columns wanted, from 0.
+    """Return columns of numbers at positions from 0, each of shape (n,); no number is NaN.
 
     Raises:
         InputError: a row has another number of entries than the first, there is no row, or no

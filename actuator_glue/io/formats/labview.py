@@ -226,12 +226,9 @@ def _rounded(text: str) -> float:
 
 
 def _joined(path: Path, clocks: list[_SegmentTimes], scale: float) -> Array:
-    """Return the times of all segments; those that begin again are later by their dates.
+    """Return the times of all segments, of so many seconds a unit.
 
-    Args:
-        path: for messages.
-        clocks: of the segments.
-        scale: seconds in the unit of their times.
+    Those that begin again are later by their dates.
 
     Raises:
         InputError: times that begin again, and no date that says when.

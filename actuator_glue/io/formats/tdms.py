@@ -138,9 +138,7 @@ def _whole(
 ) -> tuple[WaveformClock, str, str]:
     """Return the clock of a waveform from its first sample on, what breaks it, and what may.
 
-    Args:
-        last: as the last segment has it.
-        said: what each segment says of it.
+    It is made of what each segment says, and of that of the last one.
     """
     first = previous = last
     at = 0  # values before what was said last
