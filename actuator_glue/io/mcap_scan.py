@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import BinaryIO, cast
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -272,32 +272,41 @@ def plain(channel: Channel, message: Message) -> bytes:
         return data
     import zstandard
 
-    size = zstandard.frame_content_size(data)
+    try:
+        size = zstandard.frame_content_size(data)
+    except zstandard.ZstdError as error:  # cut off within its head
+        raise ValueError(str(error)) from error
     if not 0 <= size <= _MAX_CHUNK:
         raise ValueError(f'a compressed message claims {size} bytes')
+    return _of_zstd(data, size)
+
+
+def _of_zstd(data: bytes, size: int) -> bytes:
+    """Return what is compressed, so many bytes at most.
+
+    Raises:
+        ValueError: it is damaged, or not whole.
+    """
+    import zstandard
+
     try:
-        return bytes(zstandard.ZstdDecompressor().decompress(data))
+        with zstandard.ZstdDecompressor().stream_reader(data) as reader:
+            found = bytes(reader.read(size))
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from error
+    if len(found) != size:
+        raise ValueError(f'{len(found)} bytes instead of {size}')
+    return found
 
 
 def _decompress(chunk: Chunk) -> bytes:
     if chunk.compression == '':
         return bytes(chunk.data)
-    decompressed: Any
     if chunk.compression == 'zstd':
-        import zstandard
-
-        try:
-            with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
-                decompressed = reader.read(chunk.uncompressed_size)
-        except zstandard.ZstdError as error:
-            raise ValueError(str(error)) from error
-    elif chunk.compression == 'lz4':
+        return _of_zstd(chunk.data, chunk.uncompressed_size)
+    if chunk.compression == 'lz4':
         import lz4.frame
 
         with lz4.frame.LZ4FrameDecompressor() as decompressor:
-            decompressed = decompressor.decompress(chunk.data, chunk.uncompressed_size)
-    else:
-        raise ValueError(f'compression {chunk.compression!r} is unknown')
-    return bytes(decompressed)
+            return bytes(decompressor.decompress(chunk.data, chunk.uncompressed_size))
+    raise ValueError(f'compression {chunk.compression!r} is unknown')
