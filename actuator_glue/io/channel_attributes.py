@@ -26,7 +26,9 @@ def unit_of(attributes: Mapping[str, Any]) -> str:
 
 
 def plain_text(value: Any) -> str:
-    """Return an attribute as text: bytes decoded, a number in full."""
+    """Return an attribute as text: bytes decoded, a number in full, of an array of one its own."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.flat[0]
     if isinstance(value, bytes):
         return value.decode('utf-8', 'replace')
     return repr(float(value)) if isinstance(value, np.number) else str(value)

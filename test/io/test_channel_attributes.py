@@ -122,3 +122,21 @@ def test_a_unit_is_read_whatever_its_attribute_is_called(
     for same in ('mm', 'none', ''):
         record = read(write(tmp_path, {name: same}))
         assert np.allclose(record.measured, 1e-3 * COLUMNS['measured_mm'])
+
+
+@pytest.mark.parametrize(
+    'text', [np.array(['mm'], dtype=h5py.string_dtype()), np.array([b'mm']), np.bytes_('mm'), 'mm']
+)
+def test_an_attribute_may_be_an_array_of_one(tmp_path: Path, text: object) -> None:
+    """As MATLAB and others write texts: it was taken with its brackets."""
+    path = tmp_path / 'a.h5'
+    with h5py.File(path, 'w') as file:
+        file['time_s'] = TIME
+        for name in ('command', 'measured'):
+            file[name] = COLUMNS[f'{name}_mm']
+            file[name].attrs['units'] = text
+        file.attrs['hold'] = np.array(['linear'], dtype=h5py.string_dtype())
+        file.attrs['stiffness_N_per_m'] = np.array([250e3])
+    record = read(path)
+    assert np.allclose(record.measured, 1e-3 * COLUMNS['measured_mm'])
+    assert (record.hold, record.stiffness) == ('linear', 250e3)

@@ -167,6 +167,20 @@ def test_what_cannot_be_joined_is_told(tmp_path: Path) -> None:
         ag.join(*files(tmp_path, sine), by='correlation')
 
 
+@pytest.mark.parametrize('by', ['time', 'correlation'])
+def test_times_that_do_not_go_up_are_refused(tmp_path: Path, by) -> None:
+    """They ended in a division by zero, or in an index of nothing."""
+    command, response = files(tmp_path)
+    still = np.zeros(len(SWEEP))
+    for name, time in (('still', still), ('back', SWEEP.time[::-1])):
+        odd = table(tmp_path / f'{name}.csv', time, command=SWEEP.command)
+        with pytest.raises(InputError, match=rf'{name}\.csv: time does not go up'):
+            ag.join(odd, response, by=by)
+    odd = table(tmp_path / 'r2.csv', still, measured=SWEEP.measured)
+    with pytest.raises(InputError, match=r'r2\.csv: time does not go up'):
+        ag.join(command, odd, by=by)
+
+
 def test_the_command_line_joins(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As the library does; one file alone is refused."""
     command, response = map(str, files(tmp_path))
