@@ -26,7 +26,12 @@ def unit_of(attributes: Mapping[str, Any]) -> str:
 
 
 def plain_text(value: Any) -> str:
-    """Return an attribute as text: bytes decoded, a number in full, of an array of one its own."""
+    """Return an attribute as text: bytes decoded, a number in full, of an array of one its own.
+
+    Empty where it has no value, as HDF5 may have a text of no letters.
+    """
+    if getattr(value, 'shape', ()) is None:
+        return ''
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.flat[0]
     if isinstance(value, bytes):

@@ -140,3 +140,13 @@ def test_an_attribute_may_be_an_array_of_one(tmp_path: Path, text: object) -> No
     record = read(path)
     assert np.allclose(record.measured, 1e-3 * COLUMNS['measured_mm'])
     assert (record.hold, record.stiffness) == ('linear', 250e3)
+
+
+def test_an_attribute_without_a_value_says_nothing(tmp_path: Path) -> None:
+    """As MATLAB writes a text of no letters: a hold of that name refused the file."""
+    path = hdf5(tmp_path, {'units': h5py.Empty('S1'), 'gain': h5py.Empty('f')})
+    with h5py.File(path, 'a') as file:
+        file.attrs.update(hold=h5py.Empty('S1'), stiffness_N_per_m=h5py.Empty('f'))
+    told: list[str] = []
+    record = read(path, warn=told.append)
+    assert (record.hold, record.stiffness, told) == ('zoh', None, [])
