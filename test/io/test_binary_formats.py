@@ -608,3 +608,14 @@ def test_sample_numbers_that_a_float32_cannot_count_are_told_as_such(tmp_path: P
                 read(tmp_path / 'a.parquet', channels=channels)
         else:
             assert len(read(tmp_path / 'a.parquet', channels=channels)) == COUNT
+
+
+def test_columns_of_parquet_may_share_a_name(tmp_path: Path) -> None:
+    """`map` called the file damaged."""
+    columns = [np.arange(5.0) * k for k in (1, 2, 3, 4)]
+    names = ['time_s', 'x', 'command_mm', 'x']
+    table = pa.Table.from_arrays([pa.array(c) for c in columns], names=names)
+    pq.write_table(table, tmp_path / 'a.parquet')
+    found = look(tmp_path / 'a.parquet').columns
+    assert [c.name for c in found] == ['time_s', 2, 'command_mm', 4]
+    np.testing.assert_array_equal([c.values for c in found], columns)

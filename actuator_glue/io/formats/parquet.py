@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -44,7 +45,14 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             'Parquet file is damaged; copy it again from where it was written'
         )
     notes = _notes(_texts(schema.metadata))
-    fields = [field for field in schema if _is_number(field.type)]
+    # Columns may share a name: each is the first, the second of it.
+    seen: Counter[str] = Counter()
+    fields, places = [], []
+    for field in schema:
+        if _is_number(field.type):
+            fields.append(field)
+            places.append(seen[field.name])
+        seen[field.name] += 1
     if not fields:
         raise InputError(f'{path}: no column of numbers in this Parquet file')
 
@@ -52,8 +60,12 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         names = [fields[at].name for at in wanted]
         check_size(max(8 * rows * len(names), claimed), path)
         with reading(path, _NAME), parquet.ParquetFile(path) as file:
-            table = file.read(columns=names, use_threads=False)
-            return [_numbers(table.column(name)) for name in names]
+            table = file.read(columns=[*dict.fromkeys(names)], use_threads=False)
+            firsts = [table.column_names.index(name) for name in names]
+            return [
+                _numbers(table.column(first + places[at]))
+                for first, at in zip(firsts, wanted, strict=True)
+            ]
 
     unread = {f.name: str(f.type) for f in schema if not _is_number(f.type)}
     # A column of nothing has no type.
