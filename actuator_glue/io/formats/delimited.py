@@ -131,8 +131,7 @@ def read_head(
     if header_lines is None:
         if (said := _SPREADSHEET.fullmatch(top[0].strip())) is not None:
             delimiter = delimiter or said[1]
-        header_lines, line, notes = _find_names(path, top, int(said is not None))
-        line, units = _commented_units(line)
+        header_lines, line, units = _find_names(path, top, int(said is not None), notes)
     elif len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
     else:
@@ -193,33 +192,33 @@ def _refuse_left_out(path: Path, top: list[str], header_lines: int) -> None:
             )
 
 
-def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[str, str]]:
-    """Return the lines before samples or a line of units, the line of names, and the notes.
+def _find_names(
+    path: Path, top: list[str], at: int, notes: dict[str, str]
+) -> tuple[int, str, list[str]]:
+    """Return the lines before samples or a line of units, the line of names, and their units.
 
-    If the names are in comments, the last two lines are returned: the last may be units.
+    Where the names are in comments, the units may be in a comment below them.
     """
-    notes: dict[str, str] = {}
-    comments, at = [''], first
+    comments = ['']
     while at < len(top) and (_COMMENT.match(top[at]) or not top[at].strip(_NOTHING)):
         comment = uncommented(top[at])
         if comment.strip() and not take_note(comment, notes, str(path)):
             comments.append(comment)
         at += 1
-    line = '\n'.join(comments[-2:])
     if at == len(top):
-        return at, line, notes
+        return at, *_commented_units(comments[-2:])
     entries = fields_of(top[at], _best_delimiter('', top[at]))
     if len(entries) < 2 or not all(map(is_number, entries)):
         ends = range(at + 1, min(at + _BROKEN, len(top)) + 1)
         stop = next((end for end in ends if _broken(top[at:end])), at + 1)
-        return stop, ' '.join(top[at:stop]), notes
+        return stop, ' '.join(top[at:stop]), []
     if entries in ([str(i + start) for i in range(len(entries))] for start in (0, 1)):
         raise InputError(
             f'{path}: line {at + 1} may be a sample or the numbers of the columns; say which in '
             f'a channel map, with `header_lines: {at}` or `header_lines: {at + 1}`'
         )
     # Numbers are no names but the first sample; numpy.savetxt puts names behind a `#`.
-    return at, line, notes
+    return at, *_commented_units(comments[-2:])
 
 
 def _below_names(
@@ -265,9 +264,9 @@ def _broken(lines: list[str]) -> bool:
     return odd == [1, *[0] * (len(lines) - 2), 1] and _OPEN.search(lines[0]) is not None
 
 
-def _commented_units(line: str) -> tuple[str, list[str]]:
-    """Return the line of names, and the units that a comment below it holds."""
-    above, _, last = line.rpartition('\n')
+def _commented_units(comments: list[str]) -> tuple[str, list[str]]:
+    """Return the line of names of the last two comments, and the units in one below it."""
+    above, last = ['', *comments][-2:]
     delimiter = next((d for d in DELIMITERS if d in last), None)
     units = units_line(fields_of(last, delimiter))
     if units and len(fields_of(above, delimiter)) == len(units):
