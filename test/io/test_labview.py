@@ -260,3 +260,12 @@ def test_text_that_is_only_called_so_is_text(tmp_path: Path) -> None:
     np.savetxt(tmp_path / 'a.lvm', rows, delimiter='\t', header=head, comments='')
     check(tmp_path / 'a.lvm', 0)
     assert look(tmp_path / 'a.lvm').what == 'delimited text'
+
+
+@pytest.mark.parametrize('step', ['0', '-0.002', 'nan', 'x'])
+def test_a_step_that_is_none_is_refused_by_whoever_reads(tmp_path: Path, step: str) -> None:
+    """`map` ended in a division by zero."""
+    path = labview(tmp_path / 'a.lvm', channels={'Delta_X': (step, step)})
+    for each in (read, look):
+        with pytest.raises(InputError, match=rf"Delta_X is '{step}', but there is no column of"):
+            each(path)

@@ -355,7 +355,7 @@ def _number(path: Path, said: _HeadedRows, name: str, shown: list[int]) -> float
         value = float(text.replace(',', '.'))
     except ValueError:
         value = np.nan
-    if not np.isfinite(value):
+    if not np.isfinite(value) or (name == 'Delta_X' and value <= 0.0):
         raise InputError(f'{path}: {name} is {text!r}, but there is no column of times')
     return value
 
