@@ -379,10 +379,7 @@ def in_si(
 
 
 def _raw(
-    path: Path,
-    roles: dict[str, Channel],
-    table: FileTable,
-    sample_number: str | int | None = None,
+    path: Path, roles: dict[str, Channel], table: FileTable, sample_number: str | int | None = None
 ) -> dict[str, Array]:
     """Return channels as the file has them; what counts the samples is checked."""
     wanted: dict[str, str | int] = {role: channel.column for role, channel in roles.items()}

@@ -137,10 +137,7 @@ class McapFile:
             if schema.id and kind not in self._schemas:
                 self._schemas[kind] = self._writer.register_schema(*kind)
             self._channels[topic.key] = self._writer.register_channel(
-                topic.name,
-                topic.encoding,
-                self._schemas[kind] if schema.id else 0,
-                dict(metadata),
+                topic.name, topic.encoding, self._schemas[kind] if schema.id else 0, dict(metadata)
             )
 
     def add_beside(self, opcode: int, body: bytes) -> None:

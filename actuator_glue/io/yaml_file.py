@@ -176,11 +176,7 @@ def texts(values: Mapping[str, Any], names: tuple[str, ...], where: str) -> None
 
 
 def number(
-    values: dict[str, Any],
-    name: str,
-    where: str,
-    lower: float = -1e15,
-    upper: float = 1e15,
+    values: dict[str, Any], name: str, where: str, lower: float = -1e15, upper: float = 1e15
 ) -> None:
     """Make an entry, where it is there, a number within limits.
 

@@ -172,11 +172,7 @@ class Layout:
         return np.asarray(field.si(step) - field.si(np.zeros(1)) > 0.5 * every / rate)
 
     def rows(
-        self,
-        values: Mapping[str, NDArray[Any]],
-        arrival_ns: int,
-        rate: float,
-        fresh: bool = False,
+        self, values: Mapping[str, NDArray[Any]], arrival_ns: int, rate: float, fresh: bool = False
     ) -> tuple[Rows, Counter[str]]:
         """Return samples in SI units, and how many have a fault, by its name.
 

@@ -222,12 +222,7 @@ def _find_names(
 
 
 def _below_names(
-    path: Path,
-    top: list[str],
-    at: int,
-    line: str,
-    delimiter: str | None,
-    notes: dict[str, str],
+    path: Path, top: list[str], at: int, line: str, delimiter: str | None, notes: dict[str, str]
 ) -> tuple[int, str, list[str]]:
     """Return the lines before samples, the line of names, and the units below it."""
     for below in range(at, len(top)):

@@ -14,14 +14,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_attributes import scaling, unit_of
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import (
-    Column,
-    FileTable,
-    Format,
-    check_size,
-    library,
-    reading,
-)
+from actuator_glue.io.formats import Column, FileTable, Format, check_size, library, reading
 from actuator_glue.io.units import bare
 from actuator_glue.records import Array
 
