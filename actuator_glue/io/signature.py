@@ -175,10 +175,7 @@ def open_text(path: Path, errors: Literal['strict', 'replace'] = 'strict') -> Te
         if mark.match(plain) and not _ROW.search(plain):
             raise InputError(f'{path}: this is {what}, not a table of numbers; {_TABLE}')
     doubled = '\r\r\n' in start.decode(encoding, 'replace')
-    try:
-        return path.open(encoding=encoding, errors=errors, newline='\n' if doubled else None)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be read ({error.strerror or error})') from error
+    return path.open(encoding=encoding, errors=errors, newline='\n' if doubled else None)
 
 
 def _known(start: bytes) -> tuple[str, str]:

@@ -25,6 +25,7 @@ from actuator_glue.io.formats import (
     matrix_columns,
     reading,
 )
+from actuator_glue.io.signature import beginning
 from actuator_glue.io.waveforms import (
     PROPERTIES,
     WaveformClock,
@@ -47,12 +48,8 @@ _PACKING = ('scale_factor', 'add_offset')  # of netCDF, and applied
 
 def is_hdf5(path: Path) -> bool:
     """Return whether a file is HDF5, at its beginning or behind MATLAB's 512 bytes of text."""
-    try:
-        with path.open('rb') as file:
-            start = file.read(512 + len(_MAGIC))
-    except OSError:
-        return False
-    return start.startswith(_MAGIC) or start[512:] == _MAGIC
+    start = beginning(path)
+    return _MAGIC in (start[: len(_MAGIC)], start[512 : 512 + len(_MAGIC)])
 
 
 def read_tree(
