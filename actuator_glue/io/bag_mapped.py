@@ -17,7 +17,7 @@ from actuator_glue.io.bag_reader import summarise
 from actuator_glue.io.bag_topics import Stamps, TopicSeries, topic_series
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.laboratory import in_si
-from actuator_glue.io.remarks import Note, refuse, warn_caller
+from actuator_glue.io.remarks import Note, refuse, tell_gap, warn_caller
 from actuator_glue.io.resample import at_times
 from actuator_glue.records import Array, Hold, Record
 
@@ -124,12 +124,7 @@ def _stretches(
     for role, (times, _) in tracks.items():
         for at in _gaps(times):
             fault = f'{where}: {role}: nothing for {times[at + 1] - times[at]:.4g} s after '
-            fault += f'{times[at]:.6g} s'
-            if gap is None:
-                raise InputError(
-                    f'{fault}; take the stretches as records of their own with --split'
-                )
-            gap(f'{fault}; the stretches are taken as records of their own')
+            tell_gap(f'{fault}{times[at]:.6g} s', gap)
             cuts.append((float(times[at]), float(times[at + 1])))
     begin = max(float(times[0]) for times, _ in tracks.values())
     stop = min(float(times[-1]) for times, _ in tracks.values())

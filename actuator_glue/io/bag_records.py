@@ -21,7 +21,7 @@ from actuator_glue.io.bag_reader import TEST_SETUP, BagMessage, as_published, me
 from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
-from actuator_glue.io.remarks import Note, refuse, warn_caller
+from actuator_glue.io.remarks import Note, refuse, tell_gap, warn_caller
 from actuator_glue.motion import METRES
 from actuator_glue.records import Record, same_period
 from actuator_glue.sample_block import Block
@@ -148,10 +148,12 @@ def read_records(
         if breaks and topic not in publishers:
             publishers[topic] = _publishers(path, every(), topic)
             if told := publishers[topic].told:
-                _tell(f'{path}: topic {topic}: {told}', gap, 'what they sent in turn is left out')
+                tell_gap(
+                    f'{path}: topic {topic}: {told}', gap, 'what they sent in turn is left out'
+                )
         in_turn = topic in publishers and publishers[topic].in_turn(number)
         if fault and not in_turn:
-            _tell(f'{path}: topic {topic}: {fault}', gap)
+            tell_gap(f'{path}: topic {topic}: {fault}', gap)
         if segment is not None and (in_turn or fault or not segment.same_test(block, setup)):
             done.append(segment)
             segment = None
@@ -172,13 +174,6 @@ def read_records(
     if not records:
         raise InputError(without_samples(path))
     return records
-
-
-def _tell(fault: str, gap: Note | None, beside: str = '') -> None:
-    if gap is None:
-        raise InputError(f'{fault}; take the stretches as records of their own with --split')
-    apart = 'the stretches are taken as records of their own'
-    gap('; '.join(filter(None, (fault, beside, apart))))
 
 
 def _publishers(path: Path | str, every: Iterable[BagMessage], topic: str) -> Publishers:

@@ -24,3 +24,16 @@ def warn_caller(message: str) -> None:
     package = f'{Path(__file__).parents[1]}/'
     own = (i for i, f in enumerate(inspect.stack(0), 1) if not f.filename.startswith(package))
     warnings.warn(message, stacklevel=next(own, 1))
+
+
+def tell_gap(fault: str, gap: Note | None, beside: str = '') -> None:
+    """Tell where a record is parted, and what is done beside.
+
+    Raises:
+        InputError: nobody asked for parts.
+    """
+    if gap is None:
+        raise InputError(f'{fault}; take the stretches as records of their own with --split')
+    gap(
+        '; '.join(filter(None, (fault, beside, 'the stretches are taken as records of their own')))
+    )
