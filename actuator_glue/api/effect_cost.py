@@ -52,7 +52,7 @@ def effect_costs(
             draws=without,
             actuators=actuator(without, names, loop.effects, loop.specimen['stiffness']),
         )
-        cost = margins(plain, chosen)[0] - margin
+        cost = _less(margins(plain, chosen)[0], margin)
         if np.isfinite(cost).all():
             out[entry.name] = spread(cost)
     if amplitude > 0.0:
@@ -67,6 +67,12 @@ def margins(loop: Loop, chosen: Compensator) -> tuple[Array, Array]:
     whole = stability.loops(partition, loop.specimen, loop.actuators.system, chosen)
     delay = loop.actuators.delay + partition.computation_delay
     return stability.signed_margin(whole, partition.period, delay, growth > 0.0), growth
+
+
+def _less(without: Array, margin: Array) -> Array:
+    """Return a difference of margins, (m,) [s]; not-a-number of two that have no limit."""
+    with np.errstate(invalid='ignore'):
+        return without - margin
 
 
 def _nonlinear(loop: Loop, chosen: Compensator, amplitude: float) -> dict[str, Spread]:
@@ -101,7 +107,7 @@ def _nonlinear(loop: Loop, chosen: Compensator, amplitude: float) -> dict[str, S
 
     out, whole = {}, margin_with(moving)
     for name in curved:
-        cost = margin_with([n for n in moving if n != name]) - whole
+        cost = _less(margin_with([n for n in moving if n != name]), whole)
         if np.isfinite(cost).all():
             out[name] = spread(cost)
     return out

@@ -154,6 +154,12 @@ def rths(
     by_test = virtual is not None and (bool(curved) or chosen.adaptive)
     unstable = stability.share(growth > 0.0, effective)
     notes = _notes(loop, calibration, chosen, by_test)
+    endless = np.isinf(margin)
+    if endless.any() and not endless.all():
+        notes.append(
+            f'{int(endless.sum())} of {len(margin)} draws bear any delay: no spread of the delay '
+            'margin is told'
+        )
     if virtual is not None and by_test:
         unstable = virtual.diverged
         # Coefficients that adapt leave the roots of the first ones behind.

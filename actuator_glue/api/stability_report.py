@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_glue.api.stability_data import StabilityData
 from actuator_glue.api.virtual_test import CRITERIA
+from actuator_glue.hybrid.stability import FEW
 from actuator_glue.report import html, style
 
 if TYPE_CHECKING:
@@ -85,7 +86,12 @@ def lines(found: StabilityData) -> list[str]:
                 f'{_probability(failure.probability)}'
             )
     if found.most_sensitive is None:
-        out.append('the margin does not vary over the draws')
+        few = found.draws < FEW
+        out.append(
+            f'{found.draws} draws are too few to say what the margin follows'
+            if few
+            else 'the margin does not vary over the draws'
+        )
     else:
         rho = found.sensitivity[found.most_sensitive]
         out.append(f'the margin follows {found.most_sensitive} most (rank correlation {rho:+.2f})')

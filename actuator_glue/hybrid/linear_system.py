@@ -78,6 +78,7 @@ def crossings(system: System) -> Array:
     through.
     """
     R = (1.0 - system.D**2)[:, None, None]
+    R = np.where(R == 0.0, np.finfo(np.float64).eps, R)  # a gain of 1 at infinity crosses nowhere
     BD = system.B * system.D[:, None]
     A = system.A + BD[:, :, None] * system.C[:, None] / R
     BB = system.B[:, :, None] * system.B[:, None] / R

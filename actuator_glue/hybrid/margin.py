@@ -11,6 +11,8 @@ from actuator_glue.hybrid.loop import substructures
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.records import Array
 
+_ROUNDING = 1e-9  # real part of a root on the limit, over the largest root
+
 
 @dataclass(frozen=True, slots=True)
 class Margins:
@@ -40,8 +42,7 @@ def delay_margin(loop: System, delay: Array | float = 0.0) -> tuple[Array, Array
         the gain does not fall below 1 at high frequencies: no delay is borne then.
     """
     w = crossings(loop)
-    at: Complex = (1j * np.nan_to_num(w, nan=1.0)).astype(np.complex128)
-    later, sooner = _nearest(w, loop.response(at), delay)
+    later, sooner = _nearest(w, loop.response(np.asarray(1j * w)), delay)
     return np.where(np.abs(loop.D) >= 1.0, 0.0, later), sooner
 
 
@@ -76,7 +77,7 @@ def _sampled_crossings(loop: System, period: float) -> tuple[Array, Complex]:
     """Return where the gain of the sampled loop is 1 [rad/s], and the loop there."""
     discrete = held(loop, period)
     w = 2.0 * np.arctan(crossings(bilinear(discrete))) / period
-    return w, discrete.response(np.exp(1j * np.nan_to_num(w, nan=1.0) * period))
+    return w, discrete.response(np.exp(1j * w * period))
 
 
 def _nearest(w: Array, gain: Complex, delay: Array | float) -> tuple[Array, Array]:
@@ -93,13 +94,20 @@ def pure_delay_margin(partition: Partition) -> tuple[float, float]:
 
     The sampled one is what is left for the actuator when the force is held over a period and the
     partition's computation delay is spent; negative where they alone exceed what the loop bears.
+    Both are negative where the whole structure is itself unstable, by negative damping say.
     """
-    loop = nominal(partition)
-    continuous = float(delay_margin(loop)[0][0])
-    later, sooner = (float(found[0]) for found in sampled_delay_margin(loop, partition.period))
-    roots = np.linalg.eigvals(closed(held(loop, partition.period))[0])
-    lost = later > 0.0 and np.abs(roots).max() > 1.0  # by the held force alone
-    return continuous, (-sooner if lost else later) - partition.computation_delay
+    loop, period = nominal(partition), partition.period
+    roots = np.linalg.eigvals(closed(loop)[0])
+    lost = roots.real.max() > _ROUNDING * np.abs(roots).max()  # by the structure itself
+    continuous = _signed(*delay_margin(loop), lost)
+    lost = np.abs(np.linalg.eigvals(closed(held(loop, period))[0])).max() > 1.0  # or held force
+    sampled = _signed(*sampled_delay_margin(loop, period), lost)
+    return continuous, sampled - partition.computation_delay
+
+
+def _signed(later: Array, sooner: Array, lost: bool) -> float:
+    """Return the margin of the first row; negative where it is unstable without any delay."""
+    return -float(sooner[0]) if lost and later[0] > 0.0 else float(later[0])
 
 
 def nominal(partition: Partition) -> System:

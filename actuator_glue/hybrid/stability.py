@@ -19,6 +19,7 @@ from actuator_glue.hybrid.partition import Partition
 from actuator_glue.records import Array
 
 Flags = NDArray[np.bool_]
+FEW = 3  # draws that a rank correlation needs
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +102,11 @@ def tracking(found: Actuator, frequencies_hz: Sequence[float]) -> Tracking:
 
 
 def sensitivity(values: Array, inputs: Mapping[str, Array]) -> dict[str, float]:
-    """Return Spearman's rank correlation of values (m,) with each input that varies."""
-    if len(values) < 3 or np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0)) == 0.0:
+    """Return Spearman's rank correlation of values (m,) with each input that varies.
+
+    None where values do not vary, or are fewer than `FEW`.
+    """
+    if len(values) < FEW or np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0)) == 0.0:
         return {}
     return {
         name: float(scipy.stats.spearmanr(values, column).statistic)

@@ -232,3 +232,29 @@ def test_the_held_force_takes_half_a_sample_of_hardly_damped_loops_too(seed: int
     """Resonances so sharp that rounding decided on which side of them the gain is one."""
     continuous, sampled = pure_delay_margin(storeys(seed, 1e3))
     assert sampled == pytest.approx(continuous - 0.5e-3, abs=1.5e-4)
+
+
+@pytest.mark.parametrize('rate', [1.0, 2.0, 6.0])
+def test_an_undamped_structure_of_any_frequency_has_a_margin(rate: float) -> None:
+    """A pole on the axis, at 1 rad/s as anywhere, is no place where a response is asked for."""
+    k = 1000.0 * rate**2
+    pure, sampled = pure_delay_margin(Partition(1000.0, 0.0, k, Specimen(0.0, 0.0, k), 1024.0))
+    assert (pure, sampled) == (0.0, pytest.approx(-0.5 / 1024.0, rel=1e-5))
+
+
+def test_a_structure_that_is_itself_unstable_has_no_margin() -> None:
+    """It lacks the lead that takes its negative damping back: c/k of the specimen."""
+    pure, sampled = pure_delay_margin(
+        Partition(1000.0, -10.0, 2e4, Specimen(0.0, 0.0, 2e4), 1024.0)
+    )
+    assert (pure, sampled) == (
+        pytest.approx(-10.0 / 2e4, rel=1e-4),
+        pytest.approx(-10.0 / 2e4 - 0.5 / 1024.0, rel=1e-3),
+    )
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_specimen_of_the_numerical_mass_bears_no_delay() -> None:
+    """The gain is 1 at infinity: no crossing, and nothing is divided by nothing."""
+    heavy = Partition(1000.0, 100.0, 2e4, Specimen(1000.0, 0.0, 2e4), 1024.0)
+    assert pure_delay_margin(heavy)[0] == 0.0

@@ -355,3 +355,22 @@ def test_what_is_no_posterior_is_refused_without_advice_to_trust_it(tmp_path: Pa
     with pytest.raises(ag.InputError, match='it is no') as told:
         ag.Calibration.load(other)
     assert 'pickle' not in str(told.value)
+
+
+@pytest.mark.filterwarnings('error')
+def test_draws_that_bear_any_delay_are_told() -> None:
+    """Some of the draws have no margin: their number is said, none is told of the others."""
+    specimen = ag.Specimen(0.0, 0.0, 4000.0, {'stiffness': 100.0})
+    soft = ag.Partition(1000.0, 628.0, 35500.0, specimen, 1000.0)
+    found = ag.rths(soft, posterior(effects=('delay',)))
+    endless = int(np.isinf(found.margins_drawn).sum())
+    assert 0 < endless < found.draws and found.margin_s is None
+    assert f'{endless} of {found.draws} draws bear any delay' in ' '.join(found.notes)
+    certain = ag.rths(structure(0.4), posterior())
+    assert certain.margin_s is not None and 'any delay' not in ' '.join(certain.notes)
+
+
+def test_two_draws_do_not_say_what_the_margin_follows() -> None:
+    """It varies all the same."""
+    assert '2 draws are too few' in repr(ag.rths(structure(0.4), posterior(), draws=2))
+    assert 'too few' not in repr(ag.rths(structure(0.4), posterior(), draws=50))
