@@ -13,6 +13,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.online.stream import structure_effects
 from actuator_glue.records import source_name
 from actuator_glue.report import html, weights
+from actuator_glue.report.first_lines import first_lines
 from actuator_glue.report.quantity import plain, said_in
 from actuator_glue.report.timeseries import ParameterCourse, parameters_against_time
 
@@ -136,9 +137,11 @@ def _windows(found: ReplayData) -> list[WindowEstimate]:
 
 def brief(found: ReplayData) -> list[html.Block]:
     """Return the summary, the windows, what differs and what limits the answer."""
-    told = [*found.notes]
+    told = first_lines(found.notes, 'notes')
     if found.compared is not None:
-        told = [*found.compared.differing[:ROWS], *found.compared.unrepeatable[:ROWS], *told]
+        differing = first_lines(found.compared.differing, 'differences')
+        lost = first_lines(found.compared.unrepeatable, 'windows that cannot be repeated')
+        told = [*differing, *lost, *told]
     return [
         html.Text(found.summary()),
         html.Table(header(found), rows(found), TITLE),
@@ -159,7 +162,7 @@ def page(found: ReplayData) -> html.Page:
     picture = html.Picture.of(
         parameters_figure(found), 'Every parameter, with two standard deviations.'
     )
-    events = [html.Text(line) for line in dict.fromkeys(found.events)]
+    events = [html.Text(line) for line in first_lines(found.events, 'events')]
     sections = [html.Section('Windows', [*brief(found), picture])]
     if events:
         sections.append(html.Section('Events', events))

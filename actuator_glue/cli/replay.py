@@ -13,7 +13,6 @@ from actuator_glue.io.json_file import write_json
 if TYPE_CHECKING:
     from actuator_glue.api.replay_result import Replay
 
-SHOWN = 20  # windows that are named
 SETTINGS = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
 EXAMPLES = (
@@ -89,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         tracking_table,
     )
     from actuator_glue.report import weights
+    from actuator_glue.report.first_lines import first_lines
 
     table(TITLE, header(found), rows(found), args)
     if (followed := tracking_table(found)) is not None:
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
         table(weights.TITLE, *explained, args)
     if (if_true := if_true_table(found)) is not None:
         table(IF_TRUE, *if_true, args)
-    for line in (*found.notes, *list(dict.fromkeys(found.events))[:20]):
+    for line in (*first_lines(found.notes, 'notes'), *first_lines(found.events, 'events')):
         note(line)
     _verdict(found, args)
     say(
@@ -109,16 +109,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _verdict(found: Replay, args: argparse.Namespace) -> None:
+    from actuator_glue.report.first_lines import first_lines
+
     if found.compared is None:
         say('nothing published live with these settings: nothing to compare with', args)
         return
     lost = found.compared.unrepeatable
     if lost:
         say(f'{len(lost)} windows of the live run cannot be repeated to the bit:', args)
-        for line in lost[:SHOWN]:
+        for line in first_lines(lost, 'windows'):
             say(f'  {line}', args)
-        if len(lost) > SHOWN:
-            say(f'  and {len(lost) - SHOWN} more, all in the JSON', args)
     if found.identical is None:
         return
     verdict = 'identical, bit for bit' if found.identical else 'NOT identical'
@@ -127,5 +127,5 @@ def _verdict(found: Replay, args: argparse.Namespace) -> None:
         f'{found.compared.bands} bands)',
         args,
     )
-    for line in found.compared.differing[:10]:
+    for line in first_lines(found.compared.differing, 'differences'):
         say(f'  {line}', args)

@@ -27,7 +27,6 @@ class Content:
     Attributes:
         record: the longest stretch without a gap.
         samples: samples in the whole bag.
-        gaps: one line per gap.
         posteriors: PosteriorMoments in the order of their windows.
         bands: scored PredictionBands in order.
         response: the last FrequencyResponseBand, None without one.
@@ -37,7 +36,6 @@ class Content:
 
     record: Record
     samples: int
-    gaps: list[str]
     posteriors: list[Any] = field(default_factory=list)
     bands: list[Any] = field(default_factory=list)
     response: Any = None
@@ -89,9 +87,8 @@ def read(bag: Path) -> Content:
     Raises:
         InputError: it is damaged or holds no samples.
     """
-    gaps: list[str] = []
-    records = read_records(bag, gap=gaps.append)
-    content = Content(max(records, key=len), sum(len(r) for r in records), gaps)
+    records = read_records(bag, gap=lambda _: None)
+    content = Content(max(records, key=len), sum(len(r) for r in records))
     for found in messages(bag, types=WANTED):
         message = deserialize(found.type, found.data, found.definition)
         kind = WANTED[found.type]

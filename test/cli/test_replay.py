@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -286,3 +287,18 @@ def test_samples_that_nobody_described_are_named(
     said = run('replay', bag).message
     assert re.search(told, said) and '--stiffness' in said, said
     assert run('replay', bag, '--stiffness', 250e3, '--evaluations', 4000).code == 0
+
+
+def test_of_thousands_of_events_the_first_are_told(
+    estimated: Callable[..., Path], tmp_path: Path
+) -> None:
+    """A report of a bag with thousands of gaps stays small: the first, and how many more."""
+    found = replayed(estimated('bag'))
+    gaps = tuple(f'samples {i} to {i} are missing' for i in range(5000))
+    page = (
+        replace(found, events=gaps, notes=gaps).report(tmp_path / 'gaps.html').read_text('utf-8')
+    )
+    assert page.count('are missing') == 40
+    assert 'and 4980 more events, all in the JSON' in page and 'more notes' in page
+    few = replace(found, events=gaps[:20]).report(tmp_path / 'few.html').read_text('utf-8')
+    assert few.count('are missing') == 20 and 'more events' not in few

@@ -27,7 +27,7 @@ def content(*bands: SimpleNamespace) -> Content:
     """Return a bag's content: 100 samples from running index 1000 on."""
     samples = np.linspace(0.0, 1e-3, 100)
     record = Record(samples, samples, 1e-3, 0.0, first_index=1000)
-    return Content(record, 100, [], bands=list(bands))
+    return Content(record, 100, bands=list(bands))
 
 
 def test_bands_are_joined_where_they_lie() -> None:
