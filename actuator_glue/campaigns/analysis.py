@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_glue.campaigns.first_stage import first_stage
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
-from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array, Record, source_names
 
 if TYPE_CHECKING:
@@ -114,7 +114,8 @@ def _calibrated(found: Calibration) -> Row:
         'seed': found.seed,
     }
     row |= _quantiles(found.posterior, found.names)
-    row['pooling'] = pooling(found.posterior, found.names)
+    bounds = {name: p.bounds for name, p in found.parameters.items()}
+    row['pooling'] = first_stage(found.posterior, found.names, bounds)
     return row
 
 
@@ -147,7 +148,7 @@ def _told(found: Diagnosis) -> Row:
         'problems': '' if found.complete else found.summary(),
     }
     row |= _quantiles(found.posterior, found.names)
-    row['pooling'] = pooling(found.posterior, found.names)
+    row['pooling'] = first_stage(found.posterior, found.names)
     return row
 
 
@@ -159,28 +160,6 @@ def _quantiles(draws: Array, names: Sequence[str]) -> Row:
         row[f'{name}_mean'] = float(draws[:, i].mean())
         row[f'{name}_lower'], row[f'{name}_upper'] = float(lower[i]), float(upper[i])
     return row
-
-
-def pooling(draws: Array, names: Sequence[str]) -> dict[str, Any] | None:
-    """Return mean and covariance of the logarithms of Eq. (2)'s parameters, for `pooled`.
-
-    The first stage of a two-stage meta-analysis: what one test says, as a normal distribution.
-
-    Args:
-        draws: shape (m, p), SI units.
-        names: of the columns; effects' are left out.
-    """
-    columns = [i for i, name in enumerate(names) if name in NAMES]
-    some = draws[:, columns]
-    some = some[(some > 0.0).all(axis=1)]
-    if len(some) < 0.5 * len(draws):
-        return None
-    logs = np.log(some)
-    return {
-        'names': [names[i] for i in columns],
-        'mean': logs.mean(axis=0).tolist(),
-        'covariance': np.atleast_2d(np.cov(logs, rowvar=False)).tolist(),
-    }
 
 
 def _tracked(tracking: Sequence[RecordTracking], source: str) -> Row:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.stats import norm
@@ -13,7 +12,7 @@ from scipy.stats import norm
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
 from actuator_glue.campaigns.day_model import walked
 from actuator_glue.campaigns.rows import read_results
-from actuator_glue.campaigns.series import actuators_of
+from actuator_glue.campaigns.series import actuators_of, known_days
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 
@@ -133,6 +132,8 @@ def _notes(found: ActuatorHistory, sides: Sequence[list[int]]) -> tuple[str, ...
                 f'the history has a change {" and ".join(where)}: {change.day} ({moved}, '
                 f'probability {change.probability:.3f})'
             )
+    if found.series.untold:
+        notes.append(f'no test tells {", ".join(found.series.untold)}: not compared')
     groups = {g for side in sides for day in side for g in found.series.groups[day]}
     notes += [f'{o.group} is out of line: {o.reason}' for o in found.outliers if o.group in groups]
     return tuple(notes)
@@ -188,9 +189,19 @@ def _apart(found: ActuatorHistory, texts: Sequence[str], sides: Sequence[list[in
 
 def _mean(found: ActuatorHistory, side: list[int]) -> tuple[Array, Array]:
     """Return the mean of some days' estimates, and its covariance by their posteriors."""
-    series: Any = found.series
-    count = len(side)
-    return series.mean[side].mean(axis=0), series.covariance[side].sum(axis=0) / count**2
+    series, weights = found.series, _weights(found, side)
+    covariance = np.einsum('np,npq,nq->pq', weights, series.covariance[side], weights)
+    return (weights * series.mean[side]).sum(axis=0), covariance
+
+
+def _weights(found: ActuatorHistory, side: list[int]) -> Array:
+    """Return the weight of each day of a side in the mean of each parameter, (days, p).
+
+    Days that tell it count alike; where none does all stand for that.
+    """
+    known = known_days(found.series.covariance[side]).astype(np.float64)
+    known[:, ~known.any(axis=0)] = 1.0
+    return np.asarray(known / known.sum(axis=0))
 
 
 def _usual(found: ActuatorHistory, sides: Sequence[list[int]]) -> Array:
@@ -200,9 +211,9 @@ def _usual(found: ActuatorHistory, sides: Sequence[list[int]]) -> Array:
     part of it: they are what makes another machine. Medians of walk and offset do: the difference
     itself is among the days that tell them, and makes both larger where they are hardly known.
     """
-    weights = np.zeros(len(found.series.days))
+    weights = np.zeros(found.series.mean.shape)
     for side, sign in zip(sides, (-1.0, 1.0), strict=True):
-        weights[side] = sign / len(side)
-    ageing = found.pooled.walk * np.sqrt(walked(found.series.times, weights))
-    offsets = found.pooled.offset * np.sqrt((weights**2).sum())
+        weights[side] = sign * _weights(found, side)
+    ageing = found.pooled.walk * np.sqrt([walked(found.series.times, w) for w in weights.T])
+    offsets = found.pooled.offset * np.sqrt((weights**2).sum(axis=0))
     return np.asarray(np.hypot(ageing, offsets))

@@ -93,6 +93,7 @@ class HistoryData:
                 'tests': len(self.table),
                 'days': list(self.series.days),
                 'left_out': self.series.left_out,
+                'untold': list(self.series.untold),
                 'changes': [
                     {
                         'day': c.day,

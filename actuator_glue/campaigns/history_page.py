@@ -66,6 +66,12 @@ def lead(found: HistoryData) -> str:
         f'{len(found.table)} tests on {len(series.days)} days from {series.days[0]} to '
         f'{series.days[-1]}. '
     )
+    if series.untold:
+        told += (
+            f'No test tells {", ".join(map(word, series.untold))}: tests of one stiffness alone '
+            'leave them to the bounds of the prior (`group` of the recipe calibrates tests of '
+            'several together). '
+        )
     if found.changes:
         listed = '; '.join(
             f'{c.day} ({", ".join(map(word, c.moved)) or "no parameter alone"})'
@@ -190,14 +196,15 @@ def _check(found: HistoryData) -> list[Block]:
 def _next(found: HistoryData) -> list[Block]:
     low, high = found.pooled.next_interval()
     middle = np.median(found.pooled.next_draws, axis=0)
+    units = {p.name: p.unit for p in BASE}
     rows = [
         [
-            word(p.name),
-            said(middle[i], p.unit, 4),
-            f'{said(low[i], p.unit, 4)} to {said(high[i], p.unit, 4)}',
+            word(name),
+            said(middle[i], units[name], 4),
+            f'{said(low[i], units[name], 4)} to {said(high[i], units[name], 4)}',
             f'{100.0 * found.pooled.offset[i]:.2g} %',
         ]
-        for i, p in enumerate(BASE)
+        for i, name in enumerate(found.pooled.names)
     ]
     table = Table(
         ['parameter', 'median', '95 % interval', 'scatter of days'],

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from actuator_glue.campaigns.first_stage import UNKNOWN
 from actuator_glue.diagnosis.verdicts import COMPLETE
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import NAMES
@@ -28,11 +30,12 @@ class Series:
         actuator: its name.
         days: dates of the days, ISO 8601, (n,).
         times: days since the first one, (n,).
-        names: the parameters of Eq. (2), (p,).
+        names: the parameters of Eq. (2) that some test tells, (p,).
         mean: of the logarithms, (n, p).
         covariance: of the logarithms, (n, p, p).
         groups: the tests of each day.
         left_out: tests without numbers that hold, and why, by group.
+        untold: parameters that no test tells: each left them to the bounds of its prior.
     """
 
     actuator: str
@@ -43,18 +46,17 @@ class Series:
     covariance: Array
     groups: tuple[tuple[str, ...], ...]
     left_out: dict[str, str]
+    untold: tuple[str, ...] = ()
 
     def until(self, count: int) -> Series:
         """Return the first `count` days."""
-        return Series(
-            self.actuator,
-            self.days[:count],
-            self.times[:count],
-            self.names,
-            self.mean[:count],
-            self.covariance[:count],
-            self.groups[:count],
-            self.left_out,
+        return replace(
+            self,
+            days=self.days[:count],
+            times=self.times[:count],
+            mean=self.mean[:count],
+            covariance=self.covariance[:count],
+            groups=self.groups[:count],
         )
 
 
@@ -93,28 +95,46 @@ def series_of(table: DataFrame, actuator: str) -> Series:
     left_out: dict[str, str] = {}
     days: dict[str, list[tuple[str, Array, Array]]] = {}
     for row in rows.to_dict('records'):
-        told = _numbers(row)
-        if isinstance(told, str):
-            left_out[str(row['group'])] = told
+        numbers = _numbers(row)
+        if isinstance(numbers, str):
+            left_out[str(row['group'])] = numbers
         else:
-            days.setdefault(str(row['day']), []).append((str(row['group']), *told))
+            days.setdefault(str(row['day']), []).append((str(row['group']), *numbers))
     if not days:
         raise InputError(
             f'{actuator}: none of its {len(rows)} tests has numbers that hold; '
             f'{next(iter(left_out.values()))}'
         )
     combined = [_combined([(m, c) for _, m, c in of]) for of in days.values()]
+    mean, covariance = np.array([m for m, _ in combined]), np.array([c for _, c in combined])
+    known = known_days(covariance)
+    told = [i for i in range(len(NAMES)) if known[:, i].any()]
+    if not told:
+        raise InputError(
+            f'{actuator}: none of its tests tells a parameter of Eq. (2): each leaves all of them '
+            'to the bounds of its prior; calibrate tests of several stiffnesses together (`group` '
+            'of the recipe)'
+        )
+    # What a day leaves open counts for nothing; there it stands with the days that tell it.
+    for i in told:
+        mean[~known[:, i], i] = np.median(mean[known[:, i], i])
     first = date.fromisoformat(next(iter(days)))
     return Series(
         actuator=actuator,
         days=tuple(days),
         times=np.array([(date.fromisoformat(d) - first).days for d in days], dtype=np.float64),
-        names=NAMES,
-        mean=np.array([m for m, _ in combined]),
-        covariance=np.array([c for _, c in combined]),
+        names=tuple(NAMES[i] for i in told),
+        mean=mean[:, told],
+        covariance=covariance[:, told][:, :, told],
         groups=tuple(tuple(g for g, _, _ in of) for of in days.values()),
         left_out=left_out,
+        untold=tuple(n for i, n in enumerate(NAMES) if i not in told),
     )
+
+
+def known_days(covariance: Array) -> NDArray[np.bool_]:
+    """Return which days tell which parameter, (n, p), by the days' covariances (n, p, p)."""
+    return np.diagonal(covariance, axis1=1, axis2=2) < (0.1 * UNKNOWN) ** 2
 
 
 def problems_of(row: dict[str, Any]) -> str:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from laboratory_table import DAY, KNOWN, write_table
 
@@ -14,11 +15,13 @@ from actuator_glue.api.pooled_prior import PooledPrior
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
 from actuator_glue.campaigns.comparison import compare
 from actuator_glue.campaigns.day_model import hyper_draws, walked
+from actuator_glue.campaigns.first_stage import UNKNOWN
 from actuator_glue.campaigns.history_page import lead
 from actuator_glue.campaigns.pooling import pooled
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import series_of
 from actuator_glue.cli.main import main
+from actuator_glue.model.parameters import TABLE_2
 
 REPAIR = (36, (0.12, -0.10, 0.0, 0.0))
 
@@ -299,3 +302,33 @@ def test_a_page_and_a_prior_for_each_actuator(
     assert main(['history', str(tmp_path)]) == 2
     assert main(['history', str(repaired), '--actuator', 'ghost']) == 2
     assert "actuator 'ghost'" in capsys.readouterr().err
+
+
+def test_a_prior_is_not_pooled_as_if_each_test_told_it(tmp_path: Path) -> None:
+    """Tests of one stiffness: what the bounds decide has no history, and mixed days count once."""
+    write_table(tmp_path, 11, days=30)
+    path = tmp_path / 'results.parquet'
+    table = pd.read_parquet(path)
+
+    def free(text: str) -> str:
+        """A test that tells the valve alone; the rest is the middle of its bounds."""
+        told = json.loads(text)
+        told['mean'][1:] = [23.2, 15.5, 3.6]
+        told['covariance'] = np.diag([told['covariance'][0][0], *[UNKNOWN**2] * 3]).tolist()
+        return json.dumps(told)
+
+    table['pooling'] = [free(t) if i % 2 else t for i, t in enumerate(table['pooling'])]
+    table.to_parquet(path)
+    mixed = history(tmp_path, 'north')
+    assert mixed.series.untold == () and not mixed.changes and not mixed.outliers
+    low, high = mixed.pooled.next_interval()
+    assert (low < TABLE_2).all() and (high > TABLE_2).all() and (high / low < 2.0)[:3].all()
+    sides = compare(tmp_path, '2025-01-01:2025-02-10', '2025-02-11:2025-04-30')
+    assert not sides.different and all(d.upper / d.lower < 1.5 for d in sides.differences)
+    table['pooling'] = [free(t) for t in table['pooling']]
+    table.to_parquet(path)
+    alone = history(tmp_path, 'north')
+    assert alone.series.names == ('beta_1',)
+    assert alone.to_json()['untold'] == ['alpha_1_beta_0', 'alpha_2', 'alpha_3']
+    assert 'No test tells' in lead(alone)
+    assert alone.report(tmp_path / 'north.html').exists()

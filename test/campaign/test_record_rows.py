@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.campaigns.analysis import analysed, judged, pooling
+from actuator_glue.campaigns.analysis import analysed, judged
+from actuator_glue.campaigns.first_stage import UNKNOWN, first_stage
 from actuator_glue.campaigns.grouping import tasks_of
 from actuator_glue.campaigns.recipe import parse_recipe
 from actuator_glue.io.export import write
@@ -121,9 +122,32 @@ def test_pooling_is_of_logarithms(rng_seed: int) -> None:
     """Mean and covariance of what was drawn; nothing where draws reach zero (never by chance)."""
     rng = np.random.default_rng(rng_seed)
     names = ('beta_1', 'alpha_1_beta_0', 'backlash', 'alpha_2', 'alpha_3')
-    logs = rng.standard_normal((500, 5))
-    told = pooling(np.exp(logs), names)
+    logs = 0.1 * rng.standard_normal((500, 5))
+    told = first_stage(np.exp(logs), names)
     assert told is not None and told['names'] == [n for n in names if n != 'backlash']
     np.testing.assert_allclose(told['mean'], logs[:, [0, 1, 3, 4]].mean(axis=0))
     np.testing.assert_allclose(told['covariance'], np.cov(logs[:, [0, 1, 3, 4]].T))
-    assert pooling(np.exp(logs) * [1, 1, 1, 0, 1], names) is None
+    assert first_stage(np.exp(logs) * [1, 1, 1, 0, 1], names) is None
+
+
+def test_what_a_test_leaves_to_its_bounds_is_unknown() -> None:
+    """A free test tells the valve and a ratio: the prior of the others is no knowledge of it."""
+    rng = np.random.default_rng(7)
+    names = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
+    bounds = {'beta_1': (0.0, 400.0), 'alpha_1_beta_0': (0.0, 2e10)}
+    bounds |= {'alpha_2': (0.0, 1e7), 'alpha_3': (0.0, 100.0)}
+    # Uniform over the ridge as its prior is: P(alpha_2 < x) = x^2.
+    ridge = np.sqrt(rng.random(4000)) * 4e6
+    valve = 128.0 * np.exp(0.003 * rng.standard_normal(4000))
+    free = np.column_stack([valve, 4170.0 * ridge, ridge, 100.0 * rng.random(4000)])
+    told = first_stage(free, names, bounds)
+    assert told is not None
+    deviations = np.sqrt(np.diag(told['covariance']))
+    assert deviations[0] == pytest.approx(0.003, rel=0.05)
+    assert (deviations[1:] == UNKNOWN).all()
+    # A pair tells all of them, and a leakage of +- 40 % is told, too.
+    leakage = 3.0 * np.exp(0.4 * rng.standard_normal(4000))
+    pair = np.column_stack([valve, 7.9e6 * valve, 1900.0 * valve, leakage])
+    told = first_stage(pair, names, bounds)
+    assert told is not None
+    np.testing.assert_allclose(told['covariance'], np.cov(np.log(pair).T))
