@@ -10,6 +10,8 @@ import numpy as np
 
 from actuator_glue.campaigns.first_stage import first_stage
 from actuator_glue.campaigns.grouping import Task
+from actuator_glue.campaigns.rows import BETWEEN
+from actuator_glue.campaigns.whole_file import write_whole
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.records import Array, Record, source_names
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
     from actuator_glue.api.diagnosis import Diagnosis
     from actuator_glue.api.tracking import RecordTracking
 
-# Between entries of one cell.
-BETWEEN = '; '
 Row = dict[str, Any]
 
 
@@ -54,7 +54,7 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
     stiffest = called[max(fitted, key=Record.known_stiffness).source]
     row |= _tracked(found.tracking, stiffest)
     if wanted['draws']:
-        _whole(keep / 'draws' / f'{key}.npz', found.save)
+        write_whole(keep / 'draws' / f'{key}.npz', found.save)
         row['draws'] = f'draws/{key}.npz'
     left = found.structure is not None and not found.structure.intervals_hold
     named: Sequence[str] = ()
@@ -63,19 +63,11 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
         named = diagnosis.model_effects
         row |= _told(diagnosis) | _tracked(diagnosis.tracking, stiffest)
         if wanted['reports']:
-            _whole(keep / 'reports' / f'{key}.html', diagnosis.report)
+            write_whole(keep / 'reports' / f'{key}.html', diagnosis.report)
             row['report'] = f'reports/{key}.html'
     if wanted.get('partition') is not None:
         row |= judged(found, fitted, named, wanted)
     return row
-
-
-def _whole(path: Path, write: Any) -> None:
-    """Have a file written whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f'part-{path.name}')
-    write(temporary)
-    temporary.replace(path)
 
 
 def _described(task: Task, records: Sequence[Record]) -> Row:

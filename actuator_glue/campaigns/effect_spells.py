@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from actuator_glue.campaigns.analysis import BETWEEN
+from actuator_glue.campaigns.rows import BETWEEN
 from actuator_glue.model.effects import CATALOGUE
 
 

@@ -64,8 +64,10 @@ def lead(found: HistoryData) -> str:
     series = found.series
     told = (
         f'{len(found.table)} tests on {len(series.days)} days from {series.days[0]} to '
-        f'{series.days[-1]}. '
+        f'{series.days[-1]}'
     )
+    left = len(series.left_out)
+    told += f', {left} of them without numbers that count. ' if left else '. '
     if series.untold:
         told += (
             f'No test tells {", ".join(map(word, series.untold))}: tests of one stiffness alone '

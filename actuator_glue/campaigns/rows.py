@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue import __version__
 from actuator_glue.campaigns.grouping import Member, Task
+from actuator_glue.campaigns.whole_file import write_whole
 from actuator_glue.errors import InputError
 from actuator_glue.given import path as path_given
 from actuator_glue.io.bag_reader import bag_files, is_bag
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 RESULTS = 'results.parquet'
+# Between entries of one cell.
+BETWEEN = '; '
 _FOLDER = 'rows'
 # Rows that become one table at a time.
 _CHUNK = 5000
@@ -100,11 +102,8 @@ class RowFolder:
         Raises:
             OSError: the folder cannot be written.
         """
-        path = self.path(key)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(f'.{os.getpid()}.{os.urandom(4).hex()}.tmp')
-        temporary.write_text(json.dumps(json_value(row), allow_nan=False), 'utf-8')
-        temporary.replace(path)
+        text = json.dumps(json_value(row), allow_nan=False)
+        write_whole(self.path(key), lambda part: part.write_text(text, 'utf-8'))
 
     def read(self, key: str) -> Row | None:
         """Return a row; None where there is none, or none that is whole."""
@@ -112,7 +111,7 @@ class RowFolder:
 
     def all(self) -> Iterator[tuple[str, Row]]:
         """Yield key and row of every row there is."""
-        for path in sorted((self.folder / _FOLDER).glob('??/*.json')):
+        for path in sorted((self.folder / _FOLDER).glob('??/[0-9a-f]*.json')):
             row = _read(path)
             if row is not None:
                 yield path.stem, row
@@ -122,25 +121,37 @@ class RowFolder:
 
         Args:
             keys: of the groups that this run had, the key of their row; of others, as of runs
-                over other files, the row that was made last is taken.
+                over other files, the row that was made last is taken. One that holds a file of
+                this run is left out: it was grouped or named otherwise, and no test counts twice.
         """
         import pandas as pd
 
         newest: dict[str, tuple[str, str]] = {}
+        held: dict[str, frozenset[tuple[str, str]]] = {}
         for key, row in self.all():
             group, made = row['group'], row['finished']
             if keys.get(group, key) == key and (made, key) > newest.get(group, ('', '')):
                 newest[group] = (made, key)
+                held[group] = contents(row)
+        now = frozenset().union(*(held[group] for group in held.keys() & keys))
+        newest = {g: last for g, last in newest.items() if g in keys or not held[g] & now}
         chosen = [key for _, (_, key) in sorted(newest.items())]
         tables = [
             pd.DataFrame([_flat(self.read(key)) for key in chosen[i : i + _CHUNK]])
             for i in range(0, len(chosen), _CHUNK)
         ]
         table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
-        temporary = self.folder / f'{RESULTS}.tmp'
-        table.to_parquet(temporary, index=False)
-        temporary.replace(self.folder / RESULTS)
+        write_whole(self.folder / RESULTS, lambda part: table.to_parquet(part, index=False))
         return table
+
+
+def contents(row: Row) -> frozenset[tuple[str, str]]:
+    """Return what a row was made from: of each file that could be read, whose it is and its hash.
+
+    Equal files of two actuators are of two tests, as simulated ones may be.
+    """
+    hashes = str(row.get('sha256') or '').split(BETWEEN)
+    return frozenset((str(row.get('actuator')), one) for one in hashes if one)
 
 
 def _read(path: Path) -> Row | None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.campaigns.first_stage import UNKNOWN
+from actuator_glue.campaigns.rows import contents
 from actuator_glue.diagnosis.verdicts import COMPLETE
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import NAMES
@@ -94,12 +95,17 @@ def series_of(table: DataFrame, actuator: str) -> Series:
     rows = tests_of(table, actuator)
     left_out: dict[str, str] = {}
     days: dict[str, list[tuple[str, Array, Array]]] = {}
+    seen: dict[tuple[str, str], str] = {}
     for row in rows.to_dict('records'):
-        numbers = _numbers(row)
+        group, numbers, files = str(row['group']), _numbers(row), contents(row)
+        twice = next((seen[file] for file in sorted(files) if file in seen), None)
         if isinstance(numbers, str):
-            left_out[str(row['group'])] = numbers
+            left_out[group] = numbers
+        elif twice is not None:
+            left_out[group] = f'holds a file of {twice} again, which would count twice'
         else:
-            days.setdefault(str(row['day']), []).append((str(row['group']), *numbers))
+            seen |= dict.fromkeys(files, group)
+            days.setdefault(str(row['day']), []).append((group, *numbers))
     if not days:
         raise InputError(
             f'{actuator}: none of its {len(rows)} tests has numbers that hold; '

@@ -9,11 +9,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from actuator_glue import __version__
-from actuator_glue.campaigns.analysis import BETWEEN
 from actuator_glue.campaigns.cluster import forget_names
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess
-from actuator_glue.campaigns.rows import Row, RowFolder, content, fingerprint, key_of
+from actuator_glue.campaigns.rows import BETWEEN, Row, RowFolder, content, fingerprint, key_of
 
 # The process of each of a worker's threads.
 _OF_THREAD = threading.local()

@@ -265,7 +265,7 @@ def test_only_what_changed_is_made_again(here: str, records: Path, tmp_path: Pat
     broken.write_text('refuse')
     assert run().failed == 1
     assert run(again=True).computed == 1
-    assert len(read_results(tmp_path / 'out')) == 15  # one file was given by itself
+    assert len(read_results(tmp_path / 'out')) == 14  # one that was given by itself is there once
 
 
 def test_a_campaign_is_watched_from_elsewhere(
