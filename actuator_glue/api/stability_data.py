@@ -6,10 +6,23 @@ from dataclasses import dataclass
 
 from actuator_glue.api.spread import Spread
 from actuator_glue.api.virtual_test import VirtualResult
+from actuator_glue.errors import InputError
 from actuator_glue.given import number
 from actuator_glue.hybrid.margin import Margins
 from actuator_glue.hybrid.stability import Share
 from actuator_glue.records import Array
+
+
+def limit_given(limit: float) -> float:
+    """Return the largest P(unstable) that is accepted.
+
+    Raises:
+        InputError: it is no probability, as 5 for 5 %.
+    """
+    limit = number(limit, 'limit')
+    if not 0.0 <= limit <= 1.0:
+        raise InputError(f'limit {limit:g}: a probability lies between 0 and 1; 5 % is 0.05')
+    return limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +112,12 @@ class StabilityData:
     seed: int = 1
 
     def go(self, limit: float) -> bool:
-        """Whether P(unstable) is at most a limit up to its upper bound, by a usable posterior."""
-        return not self.problems and self.p_unstable.upper <= number(limit, 'limit')
+        """Whether P(unstable) is at most a limit up to its upper bound, by a usable posterior.
+
+        Raises:
+            InputError: the limit is no probability.
+        """
+        return self.p_unstable.upper <= limit_given(limit) and not self.problems
 
     def summary(self) -> str:
         """Return P(unstable) with its interval in one line."""

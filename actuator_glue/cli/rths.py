@@ -99,16 +99,16 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: partition, posterior, option or output cannot be used.
     """
-    if args.limit is not None and not 0.0 <= args.limit <= 1.0:
-        raise InputError(f'--limit {args.limit:g}: a probability lies between 0 and 1')
-
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.api.compensation import HEADER as COMPARED
     from actuator_glue.api.compensation import compare_compensators
     from actuator_glue.api.rths import FREQUENCIES, rths
+    from actuator_glue.api.stability_data import limit_given
     from actuator_glue.api.stability_report import HEADER, lines, rows
     from actuator_glue.io.ground_motion import read_ground_motion
 
+    if args.limit is not None:
+        limit_given(args.limit)  # before anything is computed
     motion = None if args.ground_motion is None else read_ground_motion(args.ground_motion, note)
     if args.scale is not None:
         if motion is None:

@@ -374,3 +374,12 @@ def test_two_draws_do_not_say_what_the_margin_follows() -> None:
     """It varies all the same."""
     assert '2 draws are too few' in repr(ag.rths(structure(0.4), posterior(), draws=2))
     assert 'too few' not in repr(ag.rths(structure(0.4), posterior(), draws=50))
+
+
+@pytest.mark.parametrize('limit', [5.0, -0.1, float('nan')])
+def test_a_limit_in_percent_is_no_go_for_everything(limit: float) -> None:
+    """5 is no probability: it would let an unstable test go."""
+    found = ag.rths(structure(0.01), posterior(), draws=20)
+    assert found.p_unstable.value == 1.0 and found.go(1.0) and not found.go(0.05)
+    with pytest.raises(ag.InputError, match='limit'):
+        found.go(limit)
