@@ -24,6 +24,7 @@ from actuator_glue.report.posterior_figure import posterior_figure
 from actuator_glue.report.quantity import plain, said_in, spread, word
 from actuator_glue.report.residual_figure import Left, residual_figure
 from actuator_glue.report.timeseries import Bands, band_at_zooms, even_zooms
+from actuator_glue.report.worst import chosen, worst
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -311,13 +312,16 @@ def page(found: CalibrationData, hybrid: str = '', next_command: str = '') -> ht
         sections.append(html.Section('How the actuator follows its command', tables))
     if found.records:
         pictures = []
-        for record in found.records:
+        left = {e.source: e.rms_m for e in found.error.records}
+        some = worst(found.records, lambda record: left.get(record.source, 0.0))
+        for record in some:
             figure, inside = bands_figure(found, record)
             name = _called(found, record) or 'a record'
             caption = (
                 f'{name}: 95 % bands; the total one holds {100 * inside:.1f} % of the samples.'
             )
             pictures.append(html.Picture.of(figure, caption))
-        sections.append(html.Section('Bands over the records', pictures))
+        drawn = [html.Text(said)] if (said := chosen(len(found.records), 'records')) else []
+        sections.append(html.Section('Bands over the records', [*drawn, *pictures]))
     made = f'{found.evaluations} evaluations, seed {found.seed}'
     return html.Page('Calibration', first.verdict[0], sections, made)

@@ -21,6 +21,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult
 from actuator_glue.records import Array, Record, source_name, source_names
+from actuator_glue.report.worst import MOST
 
 if TYPE_CHECKING:
     from actuator_glue.report import html
@@ -79,10 +80,17 @@ class RecordTracking:
 
 
 def tables(tracking: Sequence[RecordTracking]) -> list[html.Block]:
-    """Return a table for each record."""
+    """Return a table for each of the first records, and how many more there are."""
     from actuator_glue.report import html
 
-    return [html.Table(HEADER, of.rows(), of.title) for of in tracking]
+    first = [html.Table(HEADER, of.rows(), of.title) for of in tracking[:MOST]]
+    return [*first, *([html.Text(text)] if (text := more(tracking)) else [])]
+
+
+def more(tracking: Sequence[RecordTracking]) -> str:
+    """Return how many records have no table; nothing where all have one."""
+    count = len(tracking) - MOST
+    return f'tracking of {count} more records: the JSON has it' if count > 0 else ''
 
 
 def ready(records: Sequence[Record]) -> list[Record]:

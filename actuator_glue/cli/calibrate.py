@@ -161,7 +161,6 @@ def _combinations(
     """Print what holds without a stiffness, and return the exit code."""
     from actuator_glue.api.combinations import combinations
     from actuator_glue.api.combinations_report import HEADER, TITLE, rows
-    from actuator_glue.api.tracking import HEADER as TRACKING
 
     if args.partition is not None:
         raise InputError('a hybrid test cannot be judged without the specimen stiffness; give it')
@@ -177,13 +176,22 @@ def _combinations(
     failed = beside(args.save, _saving(found, args)) or failed
     following = show_first(found.first_page(), args)
     table(TITLE, HEADER, rows(found), args)
-    for of in found.tracking:
-        table(of.title, TRACKING, of.rows(), args)
+    _tracking(found, args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
     for line in found.notes[1:]:
         note(line)
     failed = beside(args.report, lambda out: found.report(out, following)) or failed
     return failed or (1 if found.problems else 0)
+
+
+def _tracking(found: Calibration | Combinations, args: argparse.Namespace) -> None:
+    from actuator_glue.api.tracking import HEADER, more
+    from actuator_glue.report.worst import MOST
+
+    for of in found.tracking[:MOST]:
+        table(of.title, HEADER, of.rows(), args)
+    if text := more(found.tracking):
+        note(text)
 
 
 def _saving(found: Calibration | Combinations, args: argparse.Namespace) -> Callable[[str], Path]:
@@ -231,7 +239,6 @@ def _show(found: Calibration, args: argparse.Namespace) -> str:
         moment_rows,
         moments_title,
     )
-    from actuator_glue.api.tracking import HEADER as TRACKING
 
     following = show_first(found.first_page(args.partition), args)
     rows: list[tuple[str, ...]] = moment_rows(found)
@@ -241,8 +248,7 @@ def _show(found: Calibration, args: argparse.Namespace) -> str:
         rows = [(*row, text) for row, text in zip(rows, mostly, strict=True)]
         columns = (*columns, 'mostly')
     table(moments_title(found), columns, rows, args)
-    for of in found.tracking:
-        table(of.title, TRACKING, of.rows(), args)
+    _tracking(found, args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
     if found.compile_seconds > 0.5:
         say(f'{found.compile_seconds:.1f} s of compilation besides, once per installation', args)

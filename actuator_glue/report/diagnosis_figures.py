@@ -25,6 +25,7 @@ from actuator_glue.report.style import (
     new_figure,
     styled,
 )
+from actuator_glue.report.worst import worst
 
 BEFORE, AFTER = DETERMINISTIC, TOTAL
 NOISE = '#dddddd'
@@ -115,13 +116,18 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
     return figure
 
 
+def _left(trace: Trace) -> float:
+    """Return the rms of what the final model leaves of a record [m]."""
+    return float(np.sqrt(np.mean((trace.measured - trace.after) ** 2)))
+
+
 @styled
 def residuals_in_time(found: DiagnosisData) -> Figure:
-    """Residual of every record against time, before and after."""
-    called = names_of(found)
-    figure = new_figure(1.6 * len(found.traces) + 0.8)
-    grid = figure.subplots(len(found.traces), 1, squeeze=False)[:, 0]
-    for axes, trace in zip(grid, found.traces, strict=True):
+    """Residual of the worst records against time, before and after."""
+    called, traces = names_of(found), worst(found.traces, _left)
+    figure = new_figure(1.6 * len(traces) + 0.8)
+    grid = figure.subplots(len(traces), 1, squeeze=False)[:, 0]
+    for axes, trace in zip(grid, traces, strict=True):
         for side, color in _sides(found):
             t, residual = _lines(trace, trace.time, trace.measured - getattr(trace, side))
             axes.plot(t, 1e6 * residual, color=color, lw=0.6, label=_text(found, side))
@@ -145,15 +151,15 @@ def _density(trace: Trace, residual: Array) -> tuple[Array, Array]:
 
 @styled
 def residuals_in_frequency(found: DiagnosisData) -> Figure:
-    """Density of the residual of every record, before and after."""
-    columns = min(len(found.traces), 2)
-    rows = -(-len(found.traces) // columns)
-    called = names_of(found)
+    """Density of the residual of the worst records, before and after."""
+    called, traces = names_of(found), worst(found.traces, _left)
+    columns = min(len(traces), 2)
+    rows = -(-len(traces) // columns)
     figure = new_figure(2.1 * rows + 0.6)
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-    for unused in panels[len(found.traces) :]:
+    for unused in panels[len(traces) :]:
         unused.set_visible(False)
-    for axes, trace in zip(panels, found.traces, strict=False):
+    for axes, trace in zip(panels, traces, strict=False):
         for side, color in _sides(found):
             f, density = _density(trace, trace.measured - getattr(trace, side))
             axes.loglog(f, 1e6 * density, color=color, lw=0.8, label=_text(found, side))
@@ -196,10 +202,10 @@ def _smooth(trace: Trace, values: Array) -> Array:
 @styled
 def loops(found: DiagnosisData) -> Figure:
     """Residual against displacement (slow part) and against velocity, before and after."""
-    called = names_of(found)
-    figure = new_figure(2.1 * len(found.traces) + 0.4)
-    grid = figure.subplots(len(found.traces), 2, squeeze=False)
-    for (left, right), trace in zip(grid, found.traces, strict=True):
+    called, traces = names_of(found), worst(found.traces, _left)
+    figure = new_figure(2.1 * len(traces) + 0.4)
+    grid = figure.subplots(len(traces), 2, squeeze=False)
+    for (left, right), trace in zip(grid, traces, strict=True):
         part, step = _slow_part(trace), max(1, len(trace.time) // _POINTS)
         for side, color in _sides(found):
             simulated: Array = getattr(trace, side)

@@ -14,6 +14,7 @@ from actuator_glue.report.diagnosis_summary import advice, closing, first_page
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 from actuator_glue.report.learned_figure import learned_terms
 from actuator_glue.report.quantity import plain, said_in, word
+from actuator_glue.report.worst import chosen
 
 _ROWS = 8  # of the table of structures
 _SAMPLERS = {
@@ -202,7 +203,7 @@ def _structures(found: DiagnosisData) -> Table:
 
 
 def _residual(found: DiagnosisData) -> Section:
-    a, called = found.alarm, names_of(found)
+    a, called, some = found.alarm, names_of(found), chosen(len(found.traces), 'parts of records')
     tests = [
         [text, plain(factor * a.tests[name])]
         for name, (text, factor) in _STATISTICS.items()
@@ -229,10 +230,13 @@ def _residual(found: DiagnosisData) -> Section:
                 f'threshold of {_um(a.threshold)} um; noise {_um(a.noise)} um; '
                 f'bootstrap p-value {a.p_value:.2g}.'
             ),
-            Picture.of(figures.residuals_in_time(found), 'Residual against time.'),
-            Picture.of(figures.residuals_in_frequency(found), 'Residual against frequency.'),
+            Picture.of(figures.residuals_in_time(found), f'Residual against time.{some}'),
             Picture.of(
-                figures.loops(found), 'Residual against displacement and against velocity.'
+                figures.residuals_in_frequency(found), f'Residual against frequency.{some}'
+            ),
+            Picture.of(
+                figures.loops(found),
+                f'Residual against displacement and against velocity.{some}',
             ),
             Table(['statistic', 'value'], tests, 'Statistics of the residual of Eq. (2).'),
             Table(

@@ -25,6 +25,7 @@ from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report import diagnosis_report
 from actuator_glue.report.diagnosis_report import page as page_of
 from actuator_glue.report.html import render
+from actuator_glue.report.worst import chosen
 
 RATE = 100.0
 FOLDER = '/laboratory/2026/campaign'
@@ -152,6 +153,22 @@ def test_lines_break_where_samples_were_held_out() -> None:
         assert np.diff(t.time[part]).max() < 1.5 / RATE
         second = figures._differing(t, 1.0)
         assert t.time[second][-1] - t.time[second][0] < 1.0
+
+
+def test_of_hundreds_of_records_the_worst_are_drawn() -> None:
+    """A picture of all would be of more points than a file may have; all of a few are drawn."""
+    few = diagnosis(6e-5)
+    worse = [replace(t, measured=t.measured + 1e-3) for t in few.traces[:3]]
+    many = replace(few, traces=(*few.traces * 60, *worse))
+    for name, columns in (('residuals_in_time', 1), ('residuals_in_frequency', 1), ('loops', 2)):
+        assert len(drawn(name, many).axes) == 12 * columns
+        assert len(drawn(name, few).axes) == len(few.traces) * columns
+    lines = [a.lines[1].get_ydata() for a in drawn('residuals_in_time', many).axes]
+    assert sum(np.nanmean(y) > 900.0 for y in lines) == 3
+    assert f'The 12 of {len(many.traces)} parts of records' in chosen(
+        len(many.traces), 'parts of records'
+    )
+    assert chosen(12, 'records') == ''
 
 
 def test_a_gap_is_no_frequency() -> None:
