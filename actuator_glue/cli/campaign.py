@@ -121,4 +121,4 @@ def _watch(folder: Path) -> int:
                 break
             time.sleep(_EVERY)
     print(now.line(time.time()))
-    return 0 if now.state == 'finished' else 1
+    return 0 if now.state == 'finished' and not now.failed else 1

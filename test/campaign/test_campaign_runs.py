@@ -280,8 +280,10 @@ def test_a_campaign_is_watched_from_elsewhere(
     line = capsys.readouterr().out
     assert 'running: 50 of 100 groups, 2 failed, 20 known before, 2 h 01 min left' in line
     assert 'no news for 10 min: it was killed' in line
-    (tmp_path / 'progress.json').write_text(json.dumps({**content, 'state': 'finished'}))
-    assert main(['campaign', '--watch', str(tmp_path)]) == 0
+    for failed in (0, 2):  # as the campaign itself ends
+        ended = {**content, 'state': 'finished', 'failed': failed}
+        (tmp_path / 'progress.json').write_text(json.dumps(ended))
+        assert main(['campaign', '--watch', str(tmp_path)]) == int(failed > 0)
     assert main(['campaign', '--watch', str(tmp_path / 'nowhere')]) == 2
     assert 'no campaign has run' in capsys.readouterr().err
 
