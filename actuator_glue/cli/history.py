@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from actuator_glue.arguments import Folder, Input, duration, whole
@@ -14,6 +16,8 @@ EXAMPLES = (
     'history campaign --report pages',
     'history campaign --actuator north --prior priors --ahead 7d',
 )
+
+_LONGEST = 60  # letters of a file's name
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,15 +95,26 @@ def run(args: argparse.Namespace) -> int:
             for i, n in enumerate(one.pooled.names)
         ]
         table('The next test', ['parameter', '2.5 %', '97.5 %'], predicted, args)
-    for one in found:
+    for one, stem in zip(found, _stems([one.actuator for one in found]), strict=True):
         for folder, suffix, write in (
             (args.prior, '.npz', one.prior.save),
             (args.report, '.html', one.report),
         ):
             if folder is not None:
                 Path(folder).mkdir(parents=True, exist_ok=True)
-                failed = beside(str(Path(folder) / f'{one.actuator}{suffix}'), write) or failed
+                failed = beside(str(Path(folder) / f'{stem}{suffix}'), write) or failed
     return failed or (0 if found else 2)
+
+
+def _stems(names: Sequence[str]) -> list[str]:
+    """Return a file's name for each actuator: what only a folder or no file may have is `_`."""
+    out: list[str] = []
+    for name in names:
+        stem = re.sub(r'[^\w .-]', '_', name).strip(' .')[:_LONGEST] or '_'
+        while stem in out:
+            stem += '_'
+        out.append(stem)
+    return out
 
 
 def _units() -> dict[str, str]:

@@ -332,3 +332,15 @@ def test_a_prior_is_not_pooled_as_if_each_test_told_it(tmp_path: Path) -> None:
     assert alone.to_json()['untold'] == ['alpha_1_beta_0', 'alpha_2', 'alpha_3']
     assert 'No test tells' in lead(alone)
     assert alone.report(tmp_path / 'north.html').exists()
+
+
+def test_an_actuator_of_any_name_has_its_files_in_the_folder(tmp_path: Path) -> None:
+    """Neither beside it nor below; two that would share one have two; plain names stay."""
+    names = ['north', '../north', 'Süd/1', 'Süd_1', '..', 'x' * 300]
+    for name in names:
+        write_table(tmp_path / 'campaign', 3, days=4, actuator=name)
+    folder = tmp_path / 'priors'
+    assert main(['history', str(tmp_path / 'campaign'), '--prior', str(folder)]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['campaign', 'priors']
+    found = sorted(p.name for p in folder.iterdir())
+    assert len(found) == len(names) and {'north.npz', 'Süd_1.npz', 'Süd_1_.npz'} <= set(found)
