@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
@@ -18,6 +18,9 @@ from actuator_glue.api.stability import StabilityResult
 from actuator_glue.hybrid.compensator import KINDS
 from actuator_glue.hybrid.ground_motion import GroundMotion
 from actuator_glue.hybrid.partition import Partition
+
+if TYPE_CHECKING:
+    from actuator_glue.report import html
 
 HEADER = ('compensator', 'P(unstable)', 'upper 95 %', 'J1 [ms]', 'J2 median', 'J2 at 95 %')
 
@@ -51,13 +54,27 @@ class Comparison:
             f'{without.p_unstable.value:.3g}'
         )
 
-    def __repr__(self) -> str:
-        """Return the table of compensators and which one to use."""
-        from actuator_glue.report.as_text import as_text
-        from actuator_glue.report.html import Table, Text
+    def brief(self) -> list[html.Block]:
+        """Return why the posterior must not be used, which compensator to use, and the table."""
+        from actuator_glue.report import html
 
-        table = Table(HEADER, self.rows(), 'Compensators')
-        return as_text([Text(self.summary()), table], '`to_json()` has them')
+        return [
+            *(html.Note(line) for line in self.found[self.best].problems),
+            html.Text(self.summary()),
+            html.Table(HEADER, self.rows(), 'Compensators'),
+        ]
+
+    def __repr__(self) -> str:
+        """Return it in a few lines."""
+        from actuator_glue.report.as_text import as_text
+
+        return as_text(self.brief(), '`to_json()` has them')
+
+    def _repr_html_(self) -> str:
+        """Return it for notebooks."""
+        from actuator_glue.report import html
+
+        return html.fragment(self.brief())
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each compensator, under HEADER."""

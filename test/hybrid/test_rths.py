@@ -383,3 +383,14 @@ def test_a_limit_in_percent_is_no_go_for_everything(limit: float) -> None:
     assert found.p_unstable.value == 1.0 and found.go(1.0) and not found.go(0.05)
     with pytest.raises(ag.InputError, match='limit'):
         found.go(limit)
+
+
+def test_a_comparison_is_shown_in_notebooks_with_what_forbids_it() -> None:
+    """As every result is: a table of HTML, and the problems of its posterior before the advice."""
+    sure = ag.rths(structure(0.4), posterior(), draws=10)
+    doubted = replace(sure, problems=('its chains stand still',))
+    for found, told in ((sure, False), (doubted, True)):
+        compared = Comparison({'none': found, 'ats': found}, 'none')
+        assert '<table' in compared._repr_html_() and 'use no compensator' in repr(compared)
+        assert ('its chains stand still' in compared._repr_html_()) == told
+        assert repr(compared).startswith('its chains stand still') == told
