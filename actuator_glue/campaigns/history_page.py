@@ -70,9 +70,9 @@ def lead(found: HistoryData) -> str:
     told += f', {left} of them without numbers that count. ' if left else '. '
     if series.untold:
         told += (
-            f'No test tells {", ".join(map(word, series.untold))}: tests of one stiffness alone '
-            'leave them to the bounds of the prior (`group` of the recipe calibrates tests of '
-            'several together). '
+            f'No test tells {", ".join(map(word, series.untold))}: each leaves that to the bounds '
+            'of its prior, as tests of one stiffness alone do (`group` of the recipe calibrates '
+            'tests of several together). '
         )
     if found.changes:
         listed = '; '.join(

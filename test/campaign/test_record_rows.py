@@ -136,8 +136,8 @@ def test_what_a_test_leaves_to_its_bounds_is_unknown() -> None:
     names = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
     bounds = {'beta_1': (0.0, 400.0), 'alpha_1_beta_0': (0.0, 2e10)}
     bounds |= {'alpha_2': (0.0, 1e7), 'alpha_3': (0.0, 100.0)}
-    # Uniform over the ridge as its prior is: P(alpha_2 < x) = x^2.
-    ridge = np.sqrt(rng.random(4000)) * 4e6
+    # Uniform over the ridge as its prior is, until alpha_1_beta_0 reaches its bound.
+    ridge = np.sqrt(rng.random(4000)) * 2e10 / 4170.0
     valve = 128.0 * np.exp(0.003 * rng.standard_normal(4000))
     free = np.column_stack([valve, 4170.0 * ridge, ridge, 100.0 * rng.random(4000)])
     told = first_stage(free, names, bounds)
@@ -151,3 +151,8 @@ def test_what_a_test_leaves_to_its_bounds_is_unknown() -> None:
     told = first_stage(pair, names, bounds)
     assert told is not None
     np.testing.assert_allclose(told['covariance'], np.cov(np.log(pair).T))
+    # So is one near zero, whose logarithm is as wide: it is known to be small.
+    tight = np.column_stack([pair[:, :3], 0.02 * rng.standard_exponential(4000)])
+    told = first_stage(tight, names, bounds)
+    assert told is not None
+    np.testing.assert_allclose(told['covariance'], np.cov(np.log(tight).T))
