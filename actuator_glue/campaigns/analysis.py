@@ -11,9 +11,9 @@ import numpy as np
 from actuator_glue.campaigns.first_stage import first_stage
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.campaigns.rows import BETWEEN
-from actuator_glue.campaigns.whole_file import write_whole
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
+from actuator_glue.io.whole_file import replaced
 from actuator_glue.records import Array, Record, source_names
 
 if TYPE_CHECKING:
@@ -54,7 +54,8 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
     stiffest = called[max(fitted, key=Record.known_stiffness).source]
     row |= _tracked(found.tracking, stiffest)
     if wanted['draws']:
-        write_whole(keep / 'draws' / f'{key}.npz', found.save)
+        with replaced(_made(keep / 'draws') / f'{key}.npz') as part:
+            found.save(part)
         row['draws'] = f'draws/{key}.npz'
     left = found.structure is not None and not found.structure.intervals_hold
     named: Sequence[str] = ()
@@ -63,11 +64,17 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
         named = diagnosis.model_effects
         row |= _told(diagnosis) | _tracked(diagnosis.tracking, stiffest)
         if wanted['reports']:
-            write_whole(keep / 'reports' / f'{key}.html', diagnosis.report)
+            with replaced(_made(keep / 'reports') / f'{key}.html') as part:
+                diagnosis.report(part)
             row['report'] = f'reports/{key}.html'
     if wanted.get('partition') is not None:
         row |= judged(found, fitted, named, wanted)
     return row
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _described(task: Task, records: Sequence[Record]) -> Row:

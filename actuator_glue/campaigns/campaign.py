@@ -20,7 +20,6 @@ from actuator_glue.campaigns.grouping import Task, tasks_of
 from actuator_glue.campaigns.progress_file import Progress, ProgressFile
 from actuator_glue.campaigns.recipe import Recipe, read_recipe
 from actuator_glue.campaigns.rows import RESULTS, RowFolder, content, fingerprint, key_of, needed
-from actuator_glue.campaigns.whole_file import write_whole
 from actuator_glue.campaigns.worker_task import carry_out, row_of
 from actuator_glue.errors import InputError
 from actuator_glue.given import of_kind, one_thing, path, whole
@@ -138,7 +137,7 @@ def _write_provenance(
         'recipe': {f.name: getattr(recipe, f.name) for f in fields(recipe) if f.name != 'files'}
         | {'files': [json_fields(rule) for rule in recipe.files]},
     }
-    write_whole(folder / 'campaign.json', lambda part: write_json(content, str(part)))
+    write_json(content, str(folder / 'campaign.json'))
 
 
 class _EndedError(InputError):

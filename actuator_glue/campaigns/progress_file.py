@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from actuator_glue.campaigns.whole_file import write_whole
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
@@ -141,7 +140,7 @@ class ProgressFile:
         with self._lock:
             self._now = replace(self._now, updated=self._clock())
             now = self._now
-        write_whole(self._path, lambda part: write_json(asdict(now), str(part)))
+        write_json(asdict(now), str(self._path))
         self._tell(now)
 
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_glue import __version__
 from actuator_glue.campaigns.grouping import Member, Task
-from actuator_glue.campaigns.whole_file import write_whole
 from actuator_glue.errors import InputError
 from actuator_glue.given import path as path_given
 from actuator_glue.io.bag_reader import bag_files, is_bag
+from actuator_glue.io.whole_file import replaced
 from actuator_glue.json_value import json_value
 from actuator_glue.optional_library import library
 
@@ -103,7 +103,9 @@ class RowFolder:
             OSError: the folder cannot be written.
         """
         text = json.dumps(json_value(row), allow_nan=False)
-        write_whole(self.path(key), lambda part: part.write_text(text, 'utf-8'))
+        self.path(key).parent.mkdir(parents=True, exist_ok=True)
+        with replaced(self.path(key)) as part:
+            part.write_text(text, 'utf-8')
 
     def read(self, key: str) -> Row | None:
         """Return a row; None where there is none, or none that is whole."""
@@ -141,7 +143,8 @@ class RowFolder:
             for i in range(0, len(chosen), _CHUNK)
         ]
         table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
-        write_whole(self.folder / RESULTS, lambda part: table.to_parquet(part, index=False))
+        with replaced(self.folder / RESULTS) as part:
+            table.to_parquet(part, index=False)
         return table
 
 

@@ -1,4 +1,4 @@
-"""Files that are written in one step: there is all of one, or nothing."""
+"""Files written in one step: others find all of one, or nothing, whoever else writes it."""
 
 from __future__ import annotations
 
@@ -11,20 +11,34 @@ from actuator_glue.errors import InputError
 
 
 @contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """Yield a name beside `path` that nobody else has; the file takes its place once it is there.
+
+    It has the suffix of `path`, by which libraries know what to write.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    part = path.with_name(f'part-{os.getpid()}-{os.urandom(4).hex()}-{path.name}')
+    try:
+        yield part
+        with part.open('rb') as written:
+            os.fsync(written.fileno())
+        part.replace(path)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+@contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Yield a file beside `path` that takes its name once it is complete and on the disk.
+    """Yield a file that takes the name `path` once it is complete and on the disk.
 
     Raises:
         InputError: it cannot be written.
     """
-    temporary = path.with_name(path.name + '.tmp')
     try:
-        yield temporary
-        with temporary.open('rb') as written:
-            os.fsync(written.fileno())
-        temporary.replace(path)
+        with replaced(path) as part:
+            yield part
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)

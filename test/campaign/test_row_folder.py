@@ -10,7 +10,6 @@ from laboratory_table import write_table
 from actuator_glue.campaigns.actuator_history import history
 from actuator_glue.campaigns.history_page import lead
 from actuator_glue.campaigns.rows import RowFolder
-from actuator_glue.campaigns.whole_file import write_whole
 
 
 def row(group: str, files: str, actuator: str = 'north', hour: int = 9) -> dict[str, str]:
@@ -35,19 +34,6 @@ def test_two_campaigns_write_the_table_of_one_folder(
     monkeypatch.setattr(pd.DataFrame, 'to_parquet', meanwhile)
     assert list(rows.gather({'a': 'aa11'})['group']) == ['a']
     assert sorted(p.name for p in tmp_path.iterdir()) == ['results.parquet', 'rows']
-
-
-def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
-    """Neither a part of it nor another file in its place."""
-    (tmp_path / 'it.txt').write_text('before')
-
-    def half(part: Path) -> None:
-        part.write_text('half')
-        raise OSError('no space left')
-
-    with pytest.raises(OSError, match='no space'):
-        write_whole(tmp_path / 'it.txt', half)
-    assert [p.read_text() for p in tmp_path.iterdir()] == ['before']
 
 
 def test_a_test_that_is_grouped_otherwise_is_in_the_table_once(tmp_path: Path) -> None:
