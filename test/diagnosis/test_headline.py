@@ -296,7 +296,7 @@ def test_what_likely_parameters_leave_bears_additions_out(
     error = replace(asked.error, reached=reached, reached_before=without)
     assert of_both_parts('missing-effect', True, error, asked.alarm.threshold) == verdict
     told = replace(asked, error=error, verdict=verdict)
-    sure = certainty(0.95, error, asked.alarm.threshold)
+    sure = certainty(0.95, True, error, asked.alarm.threshold)
     assert sure == pytest.approx(share)
     assert (told.error.to_json()['reached_before'], told.complete) == (without, False)
     if verdict == 'unexplained':
