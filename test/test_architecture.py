@@ -33,6 +33,7 @@ BOTTOM = {
     'even_times',
     'jit',
     'normal',
+    'play',
     'robust',
     'json_value',
 }
@@ -65,6 +66,7 @@ ARROWS = {
     'velocity_command': set(),
     'jit': set(),
     'normal': {'jit'},
+    'play': {'jit', 'records'},
     'robust': {'records'},
     'json_value': set(),
     'optional_library': {'errors'},

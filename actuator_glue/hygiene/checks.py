@@ -10,6 +10,7 @@ import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.slow_gain import slow_gain, told
+from actuator_glue.play import play
 from actuator_glue.records import STIFF, Array, Record
 from actuator_glue.velocity_command import is_velocity
 
@@ -180,10 +181,7 @@ def _rubs(record: Record) -> bool:
     assert record.force is not None
     x, acceleration = _slow(record.measured, record)
     force, _ = _slow(record.force, record)
-    way, kept, turned = _TURNED * float(np.ptp(x)), float(x[0]), np.zeros(len(x))
-    for i, now in enumerate(x.tolist()):
-        kept = min(max(kept, now - way), now + way)
-        turned[i] = now - kept
+    turned = x - play(x, _TURNED * float(np.ptp(x)), float(x[0]))
     rubbed = _left(force, [turned - turned.mean(), acceleration])
     return rubbed < _left(force, [x, acceleration])
 

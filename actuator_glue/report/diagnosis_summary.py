@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.telling.result import DiagnosisData
+from actuator_glue.diagnosis.verdict.rules import Excuse, excuse
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.diagnosis_figures import residual_summary
 from actuator_glue.report.first_page import FirstPage, command
@@ -74,12 +75,25 @@ def _names(found: DiagnosisData) -> list[Block]:
     return [Table(header, rows, 'What is missing, and how sure its name is.', prose=True)]
 
 
+def _left_open(found: DiagnosisData) -> Excuse | None:
+    """Return what would explain held-out records of which the fitting ones leave too much open."""
+    if found.verdict != 'undecided' or found.structure:
+        return None
+    return excuse(found.error, found.alarm.threshold)
+
+
 def _meaning(found: DiagnosisData) -> str:
     """Return what the verdict means, in a sentence."""
     if found.doubts:
         return 'In doubt, for what is told first; the rest is what the records say by themselves.'
     if found.verdict == 'missing-effect' and all(e.noise is not None for e in found.effects):
         return 'The model is enough for what moves; what is named below is in what measures it.'
+    open_ = _left_open(found)
+    if open_ is not None:
+        return (
+            f'Not decided: of held-out records nothing but noise is left {open_.how}, and the '
+            'fitting records leave that open.'
+        )
     return _MEANS[found.verdict]
 
 
@@ -89,6 +103,8 @@ def certainty(found: DiagnosisData) -> str:
     named = [e for e in found.effects if math.isfinite(e.probability)]
     if found.doubts:
         return f'{inside}, and the answer is in doubt'
+    if _left_open(found) is not None:
+        return f'{inside}; the fitting records leave open where in it'
     if not found.complete:
         return f'{inside}, and the answer is not complete: intervals are too narrow'
     if not named:
@@ -177,7 +193,7 @@ def next_command(found: DiagnosisData) -> str:
         tests = list(zip(found.setup.sources, found.setup.stiffness, strict=True))
         return command('diagnose', tests, *found.setup.options(), held=held)
     if found.verdict == 'undecided' and held:
-        return command('diagnose', held)
+        return command('diagnose', held if _left_open(found) is None else [*fitted, *held])
     if found.learned:
         return command('diagnose', fitted, '--save-effects', 'learned.yaml', held=held)
     if not found.complete:

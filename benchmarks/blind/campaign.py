@@ -59,6 +59,7 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
         'shares': case.shares,
         'parameters': dict(zip(NAMES, map(float, case.theta), strict=True)) | case.parameters,
         'colour': case.colour,
+        'stiffness': [float(k) for k in case.stiffness],
         'seconds': time.perf_counter() - start,
         'processor_seconds': time.process_time() - busy,
         'commit': commit(),

@@ -125,6 +125,15 @@ def _kind(kind: str) -> Callable[[Json], bool]:
     return lambda result: bool(result['kind'] == kind)
 
 
+def _left_open(result: Json) -> bool:
+    """Whether one stiffness was fitted, which leaves parameters open that the held-out one needs.
+
+    The stiffness of the held-out record stands last.
+    """
+    *fitted, held = result['stiffness']
+    return len(set(fitted)) == 1 and held not in fitted
+
+
 def _clear(result: Json) -> bool:
     return bool(result['kind'] == 'single' and result['ratio'] >= _CLEAR)
 
@@ -173,6 +182,12 @@ QUESTIONS: dict[str, Question] = {
     'false_doubts': Question(
         'healthy machines not said to be healthy',
         _kind('none'),
+        lambda r: bool(r['diagnosis']['verdict'] != 'none'),
+        wanted=False,
+    ),
+    'open_doubts': Question(
+        'the same: another stiffness was held out than the one under which both were fitted',
+        lambda r: bool(r['kind'] == 'none' and _left_open(r)),
         lambda r: bool(r['diagnosis']['verdict'] != 'none'),
         wanted=False,
     ),

@@ -151,3 +151,35 @@ def test_what_only_measures_lacks_nothing_that_moves() -> None:
     first, second = found.first_page().verdict
     assert first.startswith('the model is enough')
     assert second.startswith('The model is enough for what moves')
+
+
+def test_what_one_stiffness_leaves_open_is_no_contradiction() -> None:
+    """Two free tests say nothing of oil and leakage, which a held-out specimen needs.
+
+    Where all of the held-out error is inside what they leave open, no sentence says that records
+    contradict each other, or that intervals are too narrow; all records together are diagnosed
+    next.
+    """
+    theta, rng = np.array([116.0, 9.0e8, 2.4e5, 3.0]), np.random.default_rng(4)
+
+    def record(stiffness: float, source: str) -> ag.Record:
+        still = replace(swept(), stiffness=stiffness, source=source)
+        moved = np.ravel(Structure(()).simulate(theta, still))
+        return replace(still, measured=moved + 1e-5 * rng.standard_normal(len(moved)))
+
+    found = ag.diagnose(
+        [record(0.0, 'a.csv'), record(0.0, 'b.csv')],
+        record(2.4e5, 'c.csv'),
+        effort=0.05,
+        jobs=1,
+    )
+    assert found.verdict == 'undecided' and found.coverage[1] > 0.9
+    page = found.first_page()
+    told = ' '.join((*page.verdict, page.certainty))
+    assert 'the fitting records leave that open' in told and 'leave open where in it' in told
+    assert 'contradict' not in told and 'too narrow' not in told
+    assert page.command.split()[1:3] == ['diagnose', 'a.csv'] and 'c.csv' in page.command
+    # Where no parameters explain all records, that is a contradiction.
+    apart = replace(found, error=replace(found.error, reached=found.error.after))
+    told = ' '.join((*apart.first_page().verdict, apart.first_page().certainty))
+    assert 'contradict each other' in told and 'leave that open' not in told

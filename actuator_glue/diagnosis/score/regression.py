@@ -16,6 +16,7 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.structure import Structure
+from actuator_glue.play import play
 from actuator_glue.records import Array, Record
 
 _RADII = (0.005, 0.01, 0.02, 0.05, 0.1)  # of plays, in amplitudes
@@ -76,18 +77,6 @@ class Surrogate:
         }
 
 
-def _play(signal: Array, radius: float) -> Array:
-    """Play of a signal (n,) behind a gap of this half width."""
-    out, at = [], 0.0
-    for value in signal.tolist():
-        if value - radius > at:
-            at = value - radius
-        elif value + radius < at:
-            at = value + radius
-        out.append(at)
-    return np.array(out)
-
-
 def _motions(x: Array, record: Record, plays: bool) -> dict[str, Array]:
     """Polynomials of displacement, velocity, servo error and time, of order one each.
 
@@ -111,7 +100,7 @@ def _motions(x: Array, record: Record, plays: bool) -> dict[str, Array]:
             f't {name}': t * c,
         }
     for name, c in (('x', x), ('u', u), ('e', e)) if plays else ():
-        out |= {f'{name} - play {r} {name}': c - _play(c, r) for r in _RADII}
+        out |= {f'{name} - play {r} {name}': c - play(c, r, 0.0) for r in _RADII}
     out |= {'x v': x * v, 'x^2 v': x**2 * v, 'x v^2': x * v**2, 'x e': x * e}
     if record.known_stiffness() > 0.0:
         out |= {'k x': x, 'k x^2': x**2, 'k x^3': x**3, 'k sign v': np.tanh(50.0 * v)}

@@ -226,9 +226,14 @@ class BeamSearch(Judge):
         immaterial where another effect is material. A structure that leaves nothing material
         does more than correct a form, so it must only be material.
         """
-        whole = (self.left(t) < self.material for t in ranked)
-        asked = zip(ranked, (self.material if w else threshold for w in whole), strict=True)
-        return next((t for t, m in asked if self.better(t, current, m, self._choice(t))), None)
+        for trial in ranked:
+            cost = self._choice(trial)
+            if self.better(trial, current, threshold, cost):
+                return trial
+            corrects = threshold <= self.material or self.left(trial) >= self.material
+            if not corrects and self.better(trial, current, self.material, cost):
+                return trial
+        return None
 
     def _choice(self, trial: Trial) -> float:
         """Nats that the choice of a learned term costs; the level covers that of a name."""
