@@ -35,9 +35,14 @@ if TYPE_CHECKING:
     from actuator_glue.api.simulation import Command as Command
     from actuator_glue.api.simulation import simulate as simulate
     from actuator_glue.api.stability import StabilityResult as StabilityResult
+    from actuator_glue.campaigns.actuator_history import ActuatorHistory as ActuatorHistory
+    from actuator_glue.campaigns.actuator_history import history as history
     from actuator_glue.campaigns.campaign import CampaignResult as CampaignResult
     from actuator_glue.campaigns.campaign import campaign as campaign
+    from actuator_glue.campaigns.comparison import DaysCompared as DaysCompared
+    from actuator_glue.campaigns.comparison import compare as compare
     from actuator_glue.errors import InputError as InputError
+    from actuator_glue.hybrid.ground_motion import GroundMotion as GroundMotion
     from actuator_glue.hybrid.partition import Partition as Partition
     from actuator_glue.hybrid.partition import Specimen as Specimen
     from actuator_glue.io.join import join as join
@@ -47,10 +52,13 @@ if TYPE_CHECKING:
 
 # Public name: the module that holds it, and its name there ('' for the module itself).
 _PUBLIC = {
+    'ActuatorHistory': ('campaigns.actuator_history', 'ActuatorHistory'),
     'Calibration': ('api.calibration_result', 'Calibration'),
     'CampaignResult': ('campaigns.campaign', 'CampaignResult'),
     'Command': ('api.simulation', 'Command'),
+    'DaysCompared': ('campaigns.comparison', 'DaysCompared'),
     'Diagnosis': ('api.diagnosis', 'Diagnosis'),
+    'GroundMotion': ('hybrid.ground_motion', 'GroundMotion'),
     'InputError': ('errors', 'InputError'),
     'Partition': ('hybrid.partition', 'Partition'),
     'Record': ('records', 'Record'),
@@ -60,9 +68,11 @@ _PUBLIC = {
     'calibrate': ('api.calibration', 'calibrate'),
     'campaign': ('campaigns.campaign', 'campaign'),
     'combinations': ('api.combinations', 'combinations'),
+    'compare': ('campaigns.comparison', 'compare'),
     'compare_compensators': ('api.compensation', 'compare_compensators'),
     'diagnose': ('api.diagnosis', 'diagnose'),
     'effects': ('effects', ''),
+    'history': ('campaigns.actuator_history', 'history'),
     'join': ('io.join', 'join'),
     'load': ('io.load', 'load'),
     'load_records': ('io.load', 'load_records'),

@@ -14,10 +14,13 @@ import actuator_glue as ag
 from actuator_glue.cli.main import main
 
 NAMES = {
+    'ActuatorHistory',
     'Calibration',
     'CampaignResult',
     'Command',
+    'DaysCompared',
     'Diagnosis',
+    'GroundMotion',
     'InputError',
     'Partition',
     'Record',
@@ -27,9 +30,11 @@ NAMES = {
     'calibrate',
     'campaign',
     'combinations',
+    'compare',
     'compare_compensators',
     'diagnose',
     'effects',
+    'history',
     'join',
     'load',
     'load_records',

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _MOST = 100.0  # logarithm: farther off is no number to be told
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ActuatorHistory(HistoryData):
     """What the tests of one actuator tell together, and its page."""
 
@@ -42,6 +42,20 @@ class ActuatorHistory(HistoryData):
 
         path = path_given(path)
         return html.write(path, page(self, path.resolve().parent))
+
+    def __repr__(self) -> str:
+        """Return it in a few lines."""
+        from actuator_glue.campaigns.history_page import brief
+        from actuator_glue.report.as_text import as_text
+
+        return as_text(brief(self), '`to_json()` has them, `report(path)` shows them')
+
+    def _repr_html_(self) -> str:
+        """Return it for notebooks."""
+        from actuator_glue.campaigns.history_page import brief
+        from actuator_glue.report import html
+
+        return html.fragment(brief(self))
 
 
 def history(

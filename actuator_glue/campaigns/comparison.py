@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import norm
@@ -15,6 +16,9 @@ from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import actuators_of, known_days
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
+
+if TYPE_CHECKING:
+    from actuator_glue.report import html
 
 # p-value of all parameters together below which two sides are of different machines.
 DIFFERENT = 0.01
@@ -47,7 +51,7 @@ class ParameterDifference:
         return (self.name, *numbers, f'{100.0 * self.usual:.2g} %', f'{self.p_value:.2g}')
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class DaysCompared:
     """Two sides of one actuator.
 
@@ -67,6 +71,27 @@ class DaysCompared:
     different: bool
     notes: tuple[str, ...] = ()
 
+    def brief(self) -> list[html.Block]:
+        """Return the answer, the differences, and what the history says of the sides."""
+        from actuator_glue.report import html
+
+        rows = [d.row() for d in self.differences]
+        sides = f'B: {_told(self.b)}; A: {_told(self.a)}'
+        table = html.Table(HEADER, rows, sides)
+        return [html.Text(self.summary()), table, *map(html.Note, self.notes)]
+
+    def __repr__(self) -> str:
+        """Return it in a few lines."""
+        from actuator_glue.report.as_text import as_text
+
+        return as_text(self.brief(), 'the attributes hold them')
+
+    def _repr_html_(self) -> str:
+        """Return it for notebooks."""
+        from actuator_glue.report import html
+
+        return html.fragment(self.brief())
+
     def summary(self) -> str:
         """Return the answer in one line."""
         if not self.different:
@@ -76,6 +101,11 @@ class DaysCompared:
             f'{self.actuator}: another machine: {worst.name} {100.0 * (worst.ratio - 1.0):+.1f} % '
             f'(p {worst.p_value:.2g} for days of one machine)'
         )
+
+
+def _told(days: tuple[str, ...]) -> str:
+    """Say which days a side has."""
+    return days[0] if len(days) == 1 else f'{days[0]} to {days[-1]} ({len(days)} days of test)'
 
 
 def compare(folder: Path | str, a: str, b: str, *, actuator: str | None = None) -> DaysCompared:

@@ -59,6 +59,11 @@ def page(found: HistoryData, folder: Path) -> Page:
     )
 
 
+def brief(found: HistoryData) -> list[Block]:
+    """Return what a notebook shows: the history in a sentence, changes, effects, the next test."""
+    return [Text(lead(found)), *_changed(found), *_next(found)]
+
+
 def lead(found: HistoryData) -> str:
     """Return the history in a sentence or two."""
     series = found.series

@@ -63,6 +63,9 @@ def test_a_repair_is_found_on_its_day(found: ActuatorHistory) -> None:
         ratio, low, high = found.change_sizes(change)[name]
         assert low <= np.exp(step) <= high
         assert abs(np.log(ratio) - step) < 0.02
+    # A notebook, or a prompt, shows what changed and what comes next.
+    for shown in (repr(found), found._repr_html_()):
+        assert change.day in shown and 'Predicted for a test' in shown and 'array(' not in shown
 
 
 def test_an_effect_that_stays_is_expected(found: ActuatorHistory) -> None:
@@ -208,6 +211,10 @@ def test_sides_of_a_repair_differ(repaired: Path, capsys: pytest.CaptureFixture[
     assert apart.different and len(apart.a) == 36
     assert {d.name for d in apart.differences if d.p_value < 1e-6} == {'beta_1', 'alpha_1_beta_0'}
     assert abs(np.log(apart.differences[0].ratio) - 0.12) < 0.03
+    # A notebook, or a prompt, shows the answer and no arrays.
+    text, page = repr(apart), apart._repr_html_()
+    assert text.startswith(apart.summary()) and apart.summary().split(':')[0] in page
+    assert all(d.name in text and d.name in page for d in apart.differences)
     assert not compare(repaired, f'north/{days[1]}', days[2]).different
     assert main(['compare', str(repaired), days[30], days[45], '--actuator', 'north']) == 1
     said = capsys.readouterr()
