@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.telling.result import DiagnosisData
-from actuator_glue.diagnosis.verdict.rules import Excuse, excuse
+from actuator_glue.diagnosis.verdict.rules import Excuse, excuse, likely
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.diagnosis_figures import residual_summary
 from actuator_glue.report.first_page import FirstPage, command
@@ -177,10 +177,18 @@ def remedies(found: DiagnosisData) -> tuple[str, ...]:
     out = []
     for e in found.effects:
         entry = found.entry(e.name)
-        sizes = ', '.join(said(p.mean, p.unit) for p in e.parameters.values())
-        if entry.remedy:
+        if not entry.remedy:
+            continue
+        known = [said(p.mean, p.unit) for p in e.parameters.values() if p.identified]
+        what = f'{e.name}, {", ".join(known) or "of a size that is not known"}'
+        if likely(e):
             go = '' if e.noise is not None else f'; go on with --effect {e.name}, or mend it'
-            out.append(f'{e.name}, {sizes}: {entry.meaning}. What to do: {entry.remedy}{go}.')
+            out.append(f'{what}: {entry.meaning}. What to do: {entry.remedy}{go}.')
+        else:
+            out.append(
+                f'{what}: {entry.meaning}. Not likely enough for a repair; what to look at: '
+                f'{entry.remedy}.'
+            )
     return tuple(out)
 
 

@@ -24,6 +24,7 @@ from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report import diagnosis_report
 from actuator_glue.report.diagnosis_report import page as page_of
+from actuator_glue.report.diagnosis_summary import remedies
 from actuator_glue.report.html import render
 from actuator_glue.report.worst import chosen
 
@@ -242,6 +243,19 @@ def test_first_page_says_what_came_out_and_what_to_do() -> None:
         'beta_1 = 128',
     ):
         assert shown in text
+
+
+def test_remedies_say_no_more_than_names_and_sizes_do() -> None:
+    """A size that the records leave open is no size; an improbable name is no repair order."""
+    found = diagnosis(6e-5)
+    (effect,) = found.effects
+    (line,) = remedies(found)
+    assert line.startswith('backlash, 60 um: ') and 'go on with --effect backlash' in line
+    open_ = {n: replace(p, identified=False) for n, p in effect.parameters.items()}
+    (line,) = remedies(replace(found, effects=(replace(effect, parameters=open_),)))
+    assert 'of a size that is not known' in line and '60 um' not in line
+    (line,) = remedies(replace(found, effects=(replace(effect, probability=0.33),)))
+    assert 'Not likely enough for a repair' in line and '--effect' not in line
 
 
 def test_chains_that_stand_still_have_no_r_hat_and_a_report_all_the_same() -> None:
