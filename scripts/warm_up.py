@@ -1,4 +1,4 @@
-"""Compile what the first calibration, diagnosis and hybrid test need, by doing small ones.
+"""Compile what the first calibration, diagnosis, estimate and hybrid test need, by small ones.
 
 Two at a time: `make setup` runs this beside the build of the messages.
 """
@@ -26,6 +26,12 @@ COMMANDS = [
     'rths sdof --posterior {0}/posterior.npz --draws 32 --ground-motion {0}/ground.txt',
     'rths sdof --posterior {0}/play.npz --draws 32 --ground-motion {0}/ground.txt',
 ]
+# What the estimator's process does before it is ready, and a replay's; the other commands have
+# compiled most of it.
+WINDOWS = (
+    'from actuator_glue.workers.warm import warm_prior, warm_windows; '
+    'warm_windows(); warm_windows(windows=2, carried=warm_prior())'
+)
 
 
 def record(gain: float, coefficients: tuple[float, float]) -> str:
@@ -39,16 +45,17 @@ def record(gain: float, coefficients: tuple[float, float]) -> str:
     return 'time_s,command_mm,measured_mm\n' + text.getvalue()
 
 
-def run(command: str) -> None:
-    """Run one command of actuator-glue in a process of its own.
+def run(arguments: list[str]) -> None:
+    """Run Python with some arguments, in a process of its own.
 
     Raises:
         RuntimeError: it could not use its input or failed; an answer of "no" is an answer.
     """
-    line = [sys.executable, '-m', 'actuator_glue.cli.main', *command.split()]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode > 1:
-        raise RuntimeError(f'{command}: {done.stderr}')
+    done = subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, check=False
+    )
+    if done.returncode > 1 or 'Traceback' in done.stderr:
+        raise RuntimeError(f'{" ".join(arguments)}: {done.stderr}')
 
 
 def main() -> None:
@@ -62,8 +69,12 @@ def main() -> None:
             Path(folder, f'{name}.csv').write_text(response, encoding='utf-8')
         time = np.arange(200) / 100.0
         np.savetxt(Path(folder, 'ground.txt'), np.column_stack([time, np.sin(9.0 * time)]))
-        for together in (COMMANDS[:2], COMMANDS[2:5], COMMANDS[5:]):
-            list(pool.map(run, (command.format(folder) for command in together)))
+        lines = [
+            ['-m', 'actuator_glue.cli.main', *command.format(folder).split()]
+            for command in COMMANDS
+        ]
+        for together in (lines[:2], lines[2:5], [['-c', WINDOWS], *lines[5:]]):
+            list(pool.map(run, together))
 
 
 if __name__ == '__main__':
