@@ -164,21 +164,32 @@ IMPURE_CALLS = {'print', 'open', 'input'}
 SEEDED = {'Generator', 'PCG64', 'Philox', 'SeedSequence', 'BitGenerator', 'default_rng'}
 
 
+LOOKED_AT = (
+    ast.Import,
+    ast.ImportFrom,
+    ast.Call,
+    ast.ClassDef,
+    ast.FunctionDef,
+    ast.AsyncFunctionDef,
+)
+
+
 def folder_of(path: Path) -> str:
     """Return the folder or top module a source belongs to."""
     return path.relative_to(ROOT).parts[0].removesuffix('.py')
 
 
 @cache
-def parsed(path: Path) -> ast.Module:
-    """Return a source's tree."""
-    return ast.parse(path.read_text(encoding='utf-8'))
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """Return all nodes of a source that some test looks at."""
+    tree = ast.parse(path.read_text(encoding='utf-8'))
+    return tuple(node for node in ast.walk(tree) if isinstance(node, LOOKED_AT))
 
 
 def imports(path: Path) -> Iterator[tuple[str, int]]:
     """Yield each imported module with its line, relative imports resolved."""
     package = ('actuator_glue', *path.relative_to(ROOT).parent.parts)
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -260,7 +271,7 @@ def test_core_is_pure() -> None:
     assert not [
         f'{identifier(path)}:{node.lineno} calls {ast.unparse(node.func)}'
         for path in core
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.Call) and impure(node)
     ]
 
@@ -277,7 +288,7 @@ def test_functions_can_be_called_without_counting() -> None:
     """Eight parameters at most, but for compiled ones."""
     found = []
     for path in SOURCES:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 how = ' '.join(map(ast.unparse, node.decorator_list))
                 given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
@@ -290,10 +301,7 @@ def test_functions_can_be_called_without_counting() -> None:
 def test_a_name_means_one_thing() -> None:
     """No two classes of one name, and no file name three times: whoever searches finds one."""
     classes = Counter(
-        node.name
-        for path in SOURCES
-        for node in ast.walk(parsed(path))
-        if isinstance(node, ast.ClassDef)
+        node.name for path in SOURCES for node in nodes(path) if isinstance(node, ast.ClassDef)
     )
     everywhere = [p for p in [*SOURCES, *OUTSIDE] if not p.name.startswith('__')]
     files = Counter(path.name for path in everywhere)

@@ -20,18 +20,18 @@ def optional(function: ast.FunctionDef) -> set[str]:
 
 def unseeded(text: str) -> list[int]:
     """Return the lines where a generator is made without a seed, or maybe without one."""
+    if not any(name in text for name in SEEDED):
+        return []
     tree = ast.parse(text)
-    unknown = {
-        call: optional(function)
-        for function in ast.walk(tree)
-        if isinstance(function, ast.FunctionDef)
-        for call in ast.walk(function)
-    }
+    unknown = {}
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef) and (names := optional(function)):
+            unknown |= dict.fromkeys(ast.walk(function), names)
     return [
         node.lineno
         for node in ast.walk(tree)
         if isinstance(node, ast.Call)
-        and ast.unparse(node.func).rpartition('.')[2] in SEEDED
+        and getattr(node.func, 'attr', getattr(node.func, 'id', '')) in SEEDED
         and not [
             a
             for a in (*node.args, *node.keywords)
