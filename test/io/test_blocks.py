@@ -114,10 +114,19 @@ def test_rows_that_are_not_there_are_missed(tmp_path: Path) -> None:
         ag.load(path, channels=tmp_path / 'map.yaml')
 
 
-@pytest.mark.parametrize('end', ['\n', '\r\n', '\r\r\n', '\r'])
-@pytest.mark.parametrize('by', [',', ';', '\t'])
-@pytest.mark.parametrize('blank', [(), (0,), (1,), (3,), (2, 2), (3, 4)])
-def test_line_ends_and_blank_columns(tmp_path: Path, end: str, by: str, blank: tuple) -> None:
+ENDS = '\n', '\r\n', '\r\r\n', '\r'
+BLANKS = (), (0,), (1,), (3,), (2, 2), (3, 4)
+
+
+@pytest.mark.parametrize(
+    ('end', 'blank', 'by'),
+    [  # each line end with each place of blanks; each of both with each separator
+        (end, blank, ',;\t'[(i + j) % 3])
+        for i, end in enumerate(ENDS)
+        for j, blank in enumerate(BLANKS)
+    ],
+)
+def test_line_ends_and_blank_columns(tmp_path: Path, end: str, blank: tuple, by: str) -> None:
     """Columns without a name or a number anywhere, with every line end there is."""
     lines = []
     for row in [['time [s]', 'command [mm]', 'measured [mm]'], *TABLE[:60, :3].tolist()]:

@@ -148,10 +148,19 @@ def by_time_alone(times, rate=1000.0):
     return reception.counts, index, np.rint(1e6 * command).astype(int)
 
 
-@pytest.mark.parametrize('epoch', [0.0, 1.7e9])
-@pytest.mark.parametrize('phase', [0.0, 0.25, 0.5, 0.77])
-@pytest.mark.parametrize(('drift', 'jitter'), [(0.0, 0.0), (0.0, 0.1), (5e-5, 0.05), (-2e-3, 0.0)])
-def test_times_need_not_be_multiples_of_the_period(epoch, phase, drift, jitter):
+PHASES = 0.0, 0.25, 0.5, 0.77
+CLOCKS = (0.0, 0.0), (0.0, 0.1), (5e-5, 0.05), (-2e-3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ('phase', 'drift', 'jitter', 'epoch'),
+    [  # each phase with each clock; each of both from both epochs
+        (phase, *clock, (0.0, 1.7e9)[(i + j) % 2])
+        for i, phase in enumerate(PHASES)
+        for j, clock in enumerate(CLOCKS)
+    ],
+)
+def test_times_need_not_be_multiples_of_the_period(phase, drift, jitter, epoch):
     """Where they lie half between, each second sample was taken for a repeated one."""
     order = np.arange(4000)
     order[[500, 501, 2000, 2001]] = [501, 500, 2001, 2000]
@@ -191,8 +200,10 @@ def test_a_gap_is_one_however_lines_arrive(size):
     assert reception.rate_fault == ''
 
 
-@pytest.mark.parametrize('size', [1, 20, 64, 1000])
-@pytest.mark.parametrize('step', [0.05, 0.1, 1.0])
+@pytest.mark.parametrize(
+    ('size', 'step'),
+    [(1, 0.05), (1, 1.0), *((n, s) for n in (20, 1000) for s in (0.05, 0.1, 1.0))],
+)
 def test_times_of_few_digits_are_no_gaps(size, step):
     """A text of whole seconds: half of such a stream was said to be lost."""
     counted = np.arange(300, 9300)
