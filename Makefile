@@ -47,7 +47,7 @@ follow: ## the tutorial, word for word, in an empty container (root, ten minutes
 	@scripts/follow_tutorial.sh
 
 test: $(ROS_STAMP) ## all tests but the slow ones
-	@$(ROS) $(BIN)/python -m pytest -n 3 --dist loadfile --durations 10 $(PYTEST_ARGS)
+	@$(ROS) $(BIN)/python -m pytest -n 4 --dist loadfile --durations 10 $(PYTEST_ARGS)
 
 # A target of its own: before Python 3.12 every call is traced, and the tests take much longer.
 coverage: $(ROS_STAMP) ## the same tests, counting lines; fails below 90 %
