@@ -8,7 +8,7 @@ import pytest
 
 from actuator_glue.cli.main import main
 
-RATE, COUNT = 512.0, 4000
+RATE, COUNT = 512.0, 2000
 TIME = np.arange(COUNT) / RATE
 RNG = np.random.default_rng(3)
 COMMAND = np.convolve(RNG.standard_normal(COUNT + 99), np.ones(100) / 10.0, 'valid')

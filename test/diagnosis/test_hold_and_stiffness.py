@@ -19,8 +19,8 @@ from actuator_glue.records import Hold, Record
 
 RATE = 128.0
 THETA = np.array([128.0, 5.0e10, 4.23e6, 3.3])
-T = np.arange(int(24 * RATE)) / RATE
-SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
+T = np.arange(int(12 * RATE)) / RATE
+SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 12.0) * T**2)
 
 
 def machine(

@@ -61,7 +61,7 @@ def machine(
 @pytest.fixture(scope='module')
 def found() -> Diagnosis:
     """The diagnosis of a cubic transducer, 0.2 mm at 2 mm, by a catalogue that lacks its name."""
-    records = machine(0, 1.0, 2e-4, PLANTS[1], 1, 128.0, 24.0)
+    records = machine(0, 1.0, 2e-4, PLANTS[1], 1, 128.0, 12.0)
     names = tuple(n for n in pipeline.mean_effects() if n != 'sensor-curve')
     with pytest.MonkeyPatch.context() as patch:
         for place in (pipeline, reserved):

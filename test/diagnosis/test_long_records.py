@@ -37,7 +37,7 @@ def test_a_companion_whose_chains_do_not_meet_opens_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It is too small to matter: what the records fix without it stays fixed, and as it was."""
-    records = make(['valve-deadband'], [2e-4], 31)[1:2]
+    records = make(['valve-deadband'], [2e-4], 31, 12.0)[1:2]
     without = diagnose(records, seed=2, settings=Thresholds(evaluations=0))
 
     def larger(beam: BeamSearch, final: Trial, least: float | None = None) -> Trial:

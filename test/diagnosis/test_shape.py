@@ -63,7 +63,7 @@ def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     Of 158 noises one had it as friction that falls with velocity: a seed is written down.
     """
     effects = {'coulomb-friction': FRICTION}
-    machine = motions(effects, THETA, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
+    machine = motions(effects, THETA, sweep(2e-3, 8.0, 16.0), (0.0, 250e3))
     beam, found = selected_of(NAMES, machine, 1)
     assert found.final.effects == ('coulomb-friction',)
     assert learned_terms.with_terms(beam, found) is None

@@ -42,7 +42,12 @@ def streamed(effect, seed):
     return whole.slice(12_000, len(whole)), theta
 
 
-@pytest.mark.parametrize('effect', SIZES)
+QUICK = ('backlash', 'gain', 'specimen-gap')
+
+
+@pytest.mark.parametrize(
+    'effect', [e if e in QUICK else pytest.param(e, marks=pytest.mark.slow) for e in SIZES]
+)
 def test_windows_converge_soon_after_a_swap(effect):
     """Two windows may learn the ridge; the third is judged.
 
