@@ -1,7 +1,7 @@
 """Whole diagnoses of short simulated tests: effect named, healthy machine left alone."""
 
 import json
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.commands import sweep
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -42,16 +41,6 @@ def make(
         y = y + 1e-5 * rng.standard_normal(len(time))
         out.append(Record(command, y, 1 / RATE, stiffness=k))
     return out
-
-
-@pytest.fixture
-def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No learned term but the sensor's."""
-
-    def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
-        return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
-
-    monkeypatch.setattr('actuator_glue.diagnosis.refits.refits.forms', sensors)
 
 
 @pytest.mark.usefixtures('few_forms')
@@ -105,6 +94,7 @@ def test_held_out_records_that_contradict_are_undecided() -> None:
     assert not any('held-out part leaves' in line for line in agrees.advice)
 
 
+@pytest.mark.usefixtures('few_forms')
 def test_noise_of_the_measurement_is_no_missing_effect() -> None:
     """Jitter of the clock removes no error: it is told as a part of the noise."""
     rng = np.random.default_rng(18)

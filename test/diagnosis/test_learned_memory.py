@@ -101,24 +101,33 @@ def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
         assert excited['t'] == (0.0, SECONDS - 1.0 / RATE)
 
 
-def test_lost_motion_has_one_size(rng_seed: int) -> None:
+def test_lost_motion_has_one_size() -> None:
     """A share of the reading that has play is one, and must be worth its parameter.
 
-    Noise alone makes a share of one look like less in about one record of a hundred; two of three
-    must be told right.
+    Noise alone makes a share of one look like less in about one record of a hundred: a seed is
+    written down.
     """
+    assert heaviest(np.random.default_rng(1)) == ('learned-feedback-play',)
+
+
+@pytest.mark.slow
+def test_lost_motion_has_one_size_under_most_noises(rng_seed: int) -> None:
+    """Two of three."""
     rng = np.random.default_rng(rng_seed)
-    heaviest = []
-    for _ in range(3):
-        refits, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
-        beam = BeamSearch(refits, Thresholds(), lambda *_: None)
-        beam.renoise()
-        base = refits.trial(())
-        names = 'learned-feedback-hysteresis', 'learned-feedback-play'
-        assert set(names) <= set(beam.promising_terms(base))
-        trials = refits.additions(base, names)
-        heaviest.append(beam.heaviest([base, *trials]).effects)
-    assert heaviest.count(('learned-feedback-play',)) >= 2
+    told = [heaviest(rng) for _ in range(3)]
+    assert told.count(('learned-feedback-play',)) >= 2
+
+
+def heaviest(rng: np.random.Generator) -> tuple[str, ...]:
+    """What play of a reading is told as, of itself and of a share that has play."""
+    refits, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
+    beam = BeamSearch(refits, Thresholds(), lambda *_: None)
+    beam.renoise()
+    base = refits.trial(())
+    names = 'learned-feedback-hysteresis', 'learned-feedback-play'
+    assert set(names) <= set(beam.promising_terms(base))
+    trials = refits.additions(base, names)
+    return beam.heaviest([base, *trials]).effects
 
 
 @pytest.mark.slow

@@ -62,7 +62,7 @@ def fed(reception, seconds, *, true=1000.0, clock=1.0, block=10, counter=True, t
 def test_another_sample_rate_than_declared_is_told(its, given, in_order, true):
     """By the sender's time within seconds, by the arrivals where there is none."""
     reception = Reception(its, 1000.0, in_order=in_order)
-    fed(reception, 25.0, true=true, **given)
+    fed(reception, 12.0, true=true, **given)
     if true in (1000.0, 1008.0):
         assert reception.rate_fault == ''
         return
@@ -202,7 +202,7 @@ def test_a_gap_is_one_however_lines_arrive(size):
 
 @pytest.mark.parametrize(
     ('size', 'step'),
-    [(1, 0.05), (1, 1.0), *((n, s) for n in (20, 1000) for s in (0.05, 0.1, 1.0))],
+    [(1, 0.05), (1, 1.0), *((n, s) for n in (20, 64, 1000) for s in (0.05, 0.1, 1.0))],
 )
 def test_times_of_few_digits_are_no_gaps(size, step):
     """A text of whole seconds: half of such a stream was said to be lost."""
@@ -217,8 +217,8 @@ def test_times_of_few_digits_are_no_gaps(size, step):
 
 @pytest.mark.parametrize('size', [1, 20, 64])
 def test_times_in_another_unit_are_another_rate_and_no_gaps(size):
-    reception, index = in_order(np.arange(3000.0), size)
-    assert np.array_equal(index, np.arange(3000)) and not reception.counts['lost']
+    reception, index = in_order(np.arange(1000.0), size)
+    assert np.array_equal(index, np.arange(1000)) and not reception.counts['lost']
     assert 'by the sender' in reception.rate_fault
 
 
