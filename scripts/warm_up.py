@@ -32,6 +32,9 @@ WINDOWS = (
     'from actuator_glue.workers.warm import warm_prior, warm_windows; '
     'warm_windows(); warm_windows(windows=2, carried=warm_prior())'
 )
+# pytest rewrites the assertions of each file once; at their first start four processes of
+# `make test` would do so four times, side by side.
+TESTS = ['-m', 'pytest', '--collect-only', '-q']
 
 
 def record(gain: float, coefficients: tuple[float, float]) -> str:
@@ -73,7 +76,7 @@ def main() -> None:
             ['-m', 'actuator_glue.cli.main', *command.format(folder).split()]
             for command in COMMANDS
         ]
-        for together in (lines[:2], lines[2:5], [['-c', WINDOWS], *lines[5:]]):
+        for together in (lines[:2], lines[2:5], [['-c', WINDOWS], TESTS, *lines[5:]]):
             list(pool.map(run, together))
 
 
