@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import tokenize
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -76,6 +77,7 @@ def first_paragraph(path: Path) -> str:
     return text.partition('\n\n')[0].replace('\n', ' ').replace('|', '\\|')
 
 
+@cache
 def sizes(path: Path) -> tuple[int, int]:
     """Return the lines of a file: all, and those without docstrings, comments and blanks."""
     with tokenize.open(path) as file:
