@@ -194,7 +194,7 @@ def test_formal_likelihoods(run, problem_r: Path, likelihood: str) -> None:
     """The formal ones run over the same records and are far narrower than G = 256."""
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
     done = run(
-        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 12_000, '--json', '-'
+        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 24_000, '--json', '-'
     )
     assert done.code == 1, 'problem R holds a gain that Eq. (2) cannot have'
     assert done.json['parameters']['beta_1']['stddev'] < 0.7 * STDDEV[0]
@@ -249,7 +249,7 @@ def test_what_is_left_is_asked_whether_it_is_noise(run, tmp_path: Path, rng_seed
 
     A machine without it is told of nothing. beta_1 is 128 1/s, its interval far from that.
     """
-    test = ('--rate', 200, '--duration', 20, '--stiffness', 0, 250e3, '--seed', rng_seed)
+    test = ('--rate', 200, '--duration', 30, '--stiffness', 0, 250e3, '--seed', rng_seed)
     playing, sound = tmp_path / 'p.csv', tmp_path / 's.csv'
     assert run('simulate', playing, *test, '--effect', 'backlash:backlash=4e-5').code == 0
     assert run('simulate', sound, *test).code == 0
