@@ -72,5 +72,5 @@ def test_only_a_held_out_record_tells_how_it_was_set() -> None:
         (('delay',), None, True),
         ((), None, False),
     ):
-        decision: Any = SimpleNamespace(names=names, final=SimpleNamespace(own=its))
-        assert _acting(decision, held) is there
+        final: Any = SimpleNamespace(effects=names, own=its)
+        assert _acting(final, held) is there

@@ -97,7 +97,7 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
 
 def after(before: Conclusion, result: Conclusion, what: str) -> Conclusion:
     """Return an answer with the history, and the rows, of the one that it replaces."""
-    step = SearchStep.to(result.decision.final, what)
+    step = SearchStep.to(result.found.final, what)
     return beside(replace(result, history=(*before.history, step)), before)
 
 

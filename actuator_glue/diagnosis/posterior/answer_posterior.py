@@ -86,14 +86,14 @@ class AnswerPosterior:
             complete: whether nothing material is left; else the equations are wrong, and the
                 spread that this causes is added.
         """
-        draws, decision = self.mixture.points, self.result.decision
+        draws, result = self.mixture.points, self.result
         if not complete:
             form = model_form.open_form(
-                self.result.beam.refits,
-                decision.final,
-                decision.left,
+                result.beam.refits,
+                result.found.final,
+                result.decision.left,
                 self.space,
-                self.result.scorer,
+                result.scorer,
             )
             draws = model_form.widened(draws, form, self.space, self.rng)
         return posterior.opened(
@@ -135,7 +135,7 @@ def sampled(
         tell: takes progress.
     """
     found, decision, scorer = result.found, result.decision, result.scorer
-    final, refits = decision.final, result.beam.refits
+    final, refits = found.final, result.beam.refits
     # One record's own setting differs from a common effect in size only: no small effects then.
     size = max(found.material, decision.left)
     small = {} if final.own is not None else discrepancy.responses(refits, size)

@@ -34,8 +34,6 @@ class Conclusion:
 
     Attributes:
         prepared: the records, fitting part and held-out part.
-        data: the fitting part without hum.
-        scorer: noise and blocks of the final structure.
         line: hum that was removed from the data; None for none.
         found: effects with a mean response.
         seen: measurement effects.
@@ -48,8 +46,6 @@ class Conclusion:
     """
 
     prepared: Prepared
-    data: Data
-    scorer: Scorer
     line: Line | None
     found: Selection
     seen: tuple[Measured, ...]
@@ -61,9 +57,21 @@ class Conclusion:
     others: tuple[Row, ...] = ()
 
     @property
+    def data(self) -> Data:
+        """The fitting part without hum."""
+        return self.beam.refits.data
+
+    @property
+    def scorer(self) -> Scorer:
+        """Noise and blocks of the final structure."""
+        scorer = self.beam.refits.scorer
+        assert scorer is not None
+        return scorer
+
+    @property
     def scope(self) -> str:
         """Scope of the reported structure; empty for all records as they were given."""
-        own = self.decision.final.own
+        own = self.found.final.own
         scopes = (
             LINEAR if self.prepared.setup is not None else '',
             self.appeared.scope if self.appeared is not None else '',
@@ -79,7 +87,7 @@ class Conclusion:
     @cached_property
     def row(self) -> Row:
         """The row of the reported structure; hum counts as a part of its error."""
-        key = self.scope, frozenset(self.decision.final.effects)
+        key = self.scope, frozenset(self.found.final.effects)
         found = min((r for r in self.rows() if r.key == key), key=lambda r: r.left_out)
         line = self.line.rms if self.line is not None else 0.0
         return replace(found, left_out=math.hypot(found.left_out, line))
@@ -126,8 +134,8 @@ class Conclusion:
         """When the effects appeared; None if they were there from the beginning."""
         if self.appeared is None:
             return None
-        before, final = self.appeared.before, self.decision.final
-        found = dated(self.appeared, final, self.decision.noise)
+        before, final = self.appeared.before, self.found.final
+        found = dated(self.appeared, final, self.found.noise)
         if before.effects or final.effects or final.own is not None:
             return found
         one = change.alone(before, self.data, final.fit.rms, self.found.material)
@@ -152,15 +160,11 @@ def concluded(
     """
     refits, settings = beam.refits, beam.settings
     assert refits.scorer is not None
-    data = refits.data
-    seen = at_recorded_rate.find(data, found, settings, line)
+    seen = at_recorded_rate.find(refits.data, found, settings, line)
     chosen = found.final if found.final.effects else found.singles[0]
-    generic = regression.compare(data, refits.scorer, found.base, chosen)
+    generic = regression.compare(refits.data, refits.scorer, found.base, chosen)
     decision = decide(found, seen, settings, generic)
-    return Conclusion(
-        prepared, data, refits.scorer, line, found, seen, generic, decision, beam,
-        found.steps,
-    )  # fmt: skip
+    return Conclusion(prepared, line, found, seen, generic, decision, beam, found.steps)
 
 
 def searched(

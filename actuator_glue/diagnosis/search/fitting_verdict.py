@@ -11,7 +11,6 @@ from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.score.regression import Surrogate
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdicts import Verdict
 
 
@@ -21,10 +20,6 @@ class Decision:
 
     Attributes:
         verdict: see `DiagnosisData`.
-        final: structure to go on with: all additions that are supported.
-        names: its effects, named as findings.
-        measured: measurement effects, named as findings.
-        noise: rms of what no structure explains [m].
         left: rms structure that remains, without what measurement effects cause [m].
         certainty: where structure remains, the share of it that the names explain and a generic
             regression does not explain better; else 1.
@@ -32,10 +27,6 @@ class Decision:
     """
 
     verdict: Verdict
-    final: Trial
-    names: tuple[str, ...]
-    measured: tuple[Measured, ...]
-    noise: float
     left: float
     certainty: float
     limit: float
@@ -67,20 +58,11 @@ def decide(
         verdict = 'unexplained'
     elif found.final.effects or seen:
         verdict = 'missing-effect'
-    final = found.final
     doubted = verdict == 'unexplained' or (
         any_learned(found.final.structure) and left >= found.material
     )
-    return Decision(
-        verdict=verdict,
-        final=final,
-        names=final.effects,
-        measured=seen,
-        noise=found.noise,
-        left=left,
-        certainty=_certainty(found, left, surrogate) if doubted else 1.0,
-        limit=limit,
-    )
+    certainty = _certainty(found, left, surrogate) if doubted else 1.0
+    return Decision(verdict, left, certainty, limit)
 
 
 def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:

@@ -66,8 +66,8 @@ def of(
         experiments: tests that tell tied names apart, best first.
     """
     out = []
-    entries = {e.name: e for e in decision.final.structure.entries}
-    for name in decision.names:
+    entries = {e.name: e for e in found.final.structure.entries}
+    for name in found.final.effects:
         tied = [r.name for r in found.rivals[name] if r.tied and r.name != name]
         if tied:
             out.append(f'{name} cannot be told from {", ".join(tied)} here')
@@ -84,19 +84,18 @@ def of(
                 f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
                 'size changes with time, frequency or stiffness, or it stands for something else'
             )
-    out += _nearest(decision, found)
+    out += _nearest(found)
     out += _next(experiments)
-    own = decision.final.own
-    if own is not None:
+    if found.final.own is not None:
         out.append(
-            f'{decision.final.added} does not act in all records: that channel may have been set '
+            f'{found.final.added} does not act in all records: that channel may have been set '
             'differently between these tests; check its setting, or diagnose them apart'
         )
     if decision.verdict == 'unexplained':
         best = found.singles[0].added if found.singles else ''
         nearest = (
             'the additions may stand for something that the catalogue does not hold'
-            if decision.names
+            if found.final.effects
             else f'closest in the catalogue, not enough: {best}'
         )
         out.append(
@@ -129,12 +128,13 @@ def _neutral(richer: str) -> float:
     return holds[2] if holds else 0.0
 
 
-def _nearest(decision: Decision, found: Selection) -> list[str]:
+def _nearest(found: Selection) -> list[str]:
     """Say which name comes nearest to each learned term."""
     out, left = [], found.final.fit.rms
-    for name in decision.names:
-        named = [r for r in found.rivals[name] if r.name in CATALOGUE]
-        if is_learned(decision.final.structure.entries[decision.final.effects.index(name)]):
+    for entry in found.final.structure.entries:
+        name = entry.name
+        if is_learned(entry):
+            named = [r for r in found.rivals[name] if r.name in CATALOGUE]
             for r in sorted(named, key=lambda r: r.excess)[:1]:
                 out.append(
                     f'the name nearest to {name} is {r.name}, which leaves '

@@ -20,15 +20,15 @@ def _band(frequency: Array, excess: Array) -> list[float]:
     return [round(float(frequency[low]), 2), round(float(frequency[high]), 2)]
 
 
-def remaining(data: Data, decision: Decision) -> Json:
+def remaining(data: Data, error: Array, decision: Decision) -> Json:
     """Return how much structure is left, its limit, and where it lies in each record.
 
     Args:
         data: the fitting part.
+        error: of the reported structure (N,) [m].
         decision: the verdict on it.
     """
-    error, rows = decision.final.fit.error, []
-    splits, errors = splits_of(data, error), data.split(error)
+    splits, errors, rows = splits_of(data, error), data.split(error), []
     outputs = data.split(data.target - error)
     speeds = data.split(np.abs(data.velocity(data.target - error)))
     for i, (record, part, e, y, velocity, t) in enumerate(

@@ -54,12 +54,12 @@ def told(
     """
     result, after, sizes = drawn.result, drawn.after, both.estimates
     found, data, prepared = result.found, result.data, result.prepared
-    final = both.decision.final
+    decision, final = result.decision, both.final
     pressed = drawn.pressed()
     experiments = _experiments(drawn)
     learned = learned_term.described(final, data, sizes)
     contradicted = advice.contradicted(both.error, found.material)
-    still, left = _at_rest(drawn), remaining(data, both.decision)
+    still, left = _at_rest(drawn), remaining(data, final.fit.error, decision)
     shown = (
         *traces(prepared.fit, False, both.curves),
         *traces(prepared.held, True, both.curves),
@@ -71,20 +71,20 @@ def told(
         error=both.error,
         candidates=findings.candidates(result.beam, found, result.seen),
         coverage=both.coverage,
-        alarm=alarm_of(found, result.seen, both.decision, data, seed, settings.false_alarms, each),
+        alarm=alarm_of(result, settings.false_alarms, seed, each),
         advice=(
             *([prior.contradiction()] if prior and prior.contradicted else []),
             *advice.at_bound(pressed, sizes),
             *([result.onset.sentence()] if result.onset else []),
             *advice.ended(result.effort),
             *(term.sentence() for term in learned),
-            *advice.of(both.decision, left, found, result.generic, both.stretches, experiments),
+            *advice.of(decision, left, found, result.generic, both.stretches, experiments),
             *contradicted,
             *advice.zeros(both.error, found.material, record_names(shown, held_out)),
             *_beside(drawn, final, bool(contradicted)),
             *advice.unidentified(data, sizes),
             *advice.unconverged(float(np.fmax(drawn.alone.rhat, drawn.with_companions.rhat))),
-            *rest.compared(data.records, still, both.decision.noise),
+            *rest.compared(data.records, still, found.noise),
             *([prior.remark()] if prior else []),
             *prepared.remarks,
         ),
@@ -137,9 +137,9 @@ def _experiments(drawn: AnswerPosterior) -> tuple[Experiment, ...]:
     result = drawn.result
     if not drawn.rivals:
         return ()
-    final, scale = result.decision.final, result.beam.refits.scale()
+    final, scale = result.found.final, result.beam.refits.scale()
     rivals = [trial for trial, _ in drawn.rivals]
-    return ranked(final, rivals, result.scorer, scale, result.decision.noise)
+    return ranked(final, rivals, result.scorer, scale, result.found.noise)
 
 
 def _responses(drawn: AnswerPosterior) -> tuple[Response, ...]:

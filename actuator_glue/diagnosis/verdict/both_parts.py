@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.posterior.answer_posterior import AnswerPosterior, estimates
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
-from actuator_glue.diagnosis.search.fitting_verdict import Decision
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdict import findings, held_out_reach, rules
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.held_out_look import BandCurves, verify
@@ -32,7 +32,7 @@ class BothParts:
 
     Attributes:
         verdict: see DiagnosisData.
-        decision: that of the fitting part, its certainty limited by both parts.
+        final: the reported structure; one record's own setting acts in held-out records, too.
         effects: additions with sizes, rivals and probabilities.
         error: held-out error before and after.
         coverage: share of held-out samples in the 95 % band, before and after.
@@ -45,7 +45,7 @@ class BothParts:
     """
 
     verdict: Verdict
-    decision: Decision
+    final: Trial
     effects: tuple[Finding, ...]
     error: HeldOutError
     coverage: tuple[float, float]
@@ -70,13 +70,13 @@ def _where_it_acts(own: OneRecord, theta: Array, held: Data) -> OneRecord:
     return own.acting_in((*own.records, *more))
 
 
-def _acting(decision: Decision, held: Data) -> bool:
+def _acting(final: Trial, held: Data) -> bool:
     """Whether any addition acts in the held-out part; of one that does not, that says nothing."""
-    own = decision.final.own
+    own = final.own
     if not isinstance(own, OneRecord):
-        return bool(decision.names)
+        return bool(final.effects)
     there = any(record is its for record in held.records for its in own.records)
-    return there or any(name != own.own for name in decision.names)
+    return there or any(name != own.own for name in final.effects)
 
 
 def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) -> BothParts:
@@ -93,29 +93,28 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) 
     if isinstance(after.model, OneRecord):
         own = _where_it_acts(after.model, after.theta, result.prepared.held)
         after = replace(after, model=own)
-        decision = replace(decision, final=replace(decision.final, own=own))
-    acting = _acting(decision, result.prepared.held)
+        found = replace(found, final=replace(found.final, own=own))
+    final, acting = found.final, _acting(found.final, result.prepared.held)
     held, fitted = (replace(d, each=each) for d in (result.prepared.held, result.data))
     error, coverage, curves = verify(
-        fitted, held, before, after, decision.noise, seed, result.line, len(found.singles)
+        fitted, held, before, after, found.noise, seed, result.line, len(found.singles)
     )
     error = held_out_reach.reached_by_both(
         error, found.material, result.scorer, held, before, after
     )
     judged = rules.of_both_parts(decision.verdict, acting, error, found.material)
-    described = any_learned(decision.final.structure)
+    described = any_learned(final.structure)
     if other is not None and described and judged in COMPLETE:
         # A learned term that another set-up makes unnecessary describes the wrong set-up.
         judged = 'unexplained'
     draws, fixed = drawn.spread(judged in COMPLETE)
     sizes = estimates(drawn.space, after.model, draws, fixed)
     certain = rules.certainty(decision.certainty, acting, error, found.material)
-    decision = replace(decision, certainty=certain)
-    stretches = agreement.agreement(decision.final, result.scorer)
-    effects = findings.of(decision, found, sizes, stretches)
+    stretches = agreement.agreement(final, result.scorer)
+    effects = findings.of(found, result.seen, certain, sizes, stretches)
     return BothParts(
         verdict=rules.named(judged, effects),
-        decision=decision,
+        final=final,
         effects=effects,
         error=error,
         coverage=coverage,

@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.score.scorer import splits_of
-from actuator_glue.diagnosis.search.fitting_verdict import Decision
-from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.noise import Split, structured
@@ -150,20 +148,20 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
     return out
 
 
-def alarm_of(
-    found: Selection,
-    seen: tuple[Measured, ...],
-    decision: Decision,
-    data: Data,
-    seed: int,
-    level: float,
-    each: Each = map,
-) -> Alarm:
-    """Describe the alarm behind the decision; `level` is the probability of false alarms."""
-    error = found.base.fit.error
+def alarm_of(result: Conclusion, level: float, seed: int, each: Each = map) -> Alarm:
+    """Describe the alarm behind the answer of the fitting part.
+
+    Args:
+        result: the answer.
+        level: probability of a false alarm.
+        seed: seed of the bootstrap.
+        each: draws several records of noise at a time if it can.
+    """
+    found, data, error = result.found, result.data, result.found.base.fit.error
+    parts = [found.structure, *found.removed.values(), *(m.rms for m in result.seen)]
     return Alarm(
-        raised=decision.verdict != 'none',
-        structured=max([found.structure, *found.removed.values(), *(m.rms for m in seen)]),
+        raised=result.decision.verdict != 'none',
+        structured=max(parts),
         threshold=found.material,
         noise=found.noise,
         p_value=p_value(data, splits_of(data, error), seed, each),

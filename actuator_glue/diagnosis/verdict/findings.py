@@ -1,4 +1,4 @@
-"""Findings of a decision: sizes, rivals, probabilities, errors with and without."""
+"""Findings of an answer: sizes, rivals, probabilities, errors with and without."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.score import reliability
-from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.search.gains import standard_error
 from actuator_glue.diagnosis.search.judge import Judge
 from actuator_glue.diagnosis.selection import Selection
@@ -32,20 +31,28 @@ def _measured_estimates(effect: Measured) -> dict[str, Estimate]:
 
 
 def of(
-    decision: Decision,
     found: Selection,
+    seen: Sequence[Measured],
+    certainty: float,
     estimates: dict[str, Estimate],
     stretches: dict[str, Homogeneity],
 ) -> tuple[Finding, ...]:
-    """Return the additions of a decision with sizes, rivals and errors, most removed first."""
+    """Return the additions with sizes, rivals and errors, most removed first.
+
+    Args:
+        found: what the fitting part says.
+        seen: effects of the measurement.
+        certainty: factor on the names' share of the weight, in [0, 1].
+        estimates: of all parameters.
+        stretches: sizes of each effect in halves of the records.
+    """
     out = []
-    entries = {e.name: e for e in decision.final.structure.entries}
-    for name in decision.names:
-        described = learned_term.is_learned(entries[name])
+    for entry in found.final.structure.entries:
+        name, described = entry.name, learned_term.is_learned(entry)
         # A learned term is a description: its name is no cause that might be true.
-        own = {p.name: estimates[p.name] for p in entries[name].parameters}
+        own = {p.name: estimates[p.name] for p in entry.parameters}
         sizes = _how_much(tuple(own.values()))
-        rivals = _told(found.rivals[name], decision.certainty, sizes)
+        rivals = _told(found.rivals[name], certainty, sizes)
         tied = [r for r in rivals if r.tied]
         gained = found.removed[name]
         out.append(
@@ -55,7 +62,7 @@ def of(
                 probability=math.nan
                 if described
                 else next(r.probability for r in rivals if r.name == name),
-                place=entries[name].place,
+                place=entry.place,
                 parameters=own,
                 error_without=float(np.sqrt(found.final.mean_square + gained**2)),
                 error_with=found.final.fit.rms,
@@ -63,12 +70,12 @@ def of(
                 plausible=any(map(_excludes_neutral, sizes)),
                 agrees_across_windows=stretches[name].agree,
                 windows=stretches[name].values,
-                records=_records_of(decision.final, name),
+                records=_records_of(found.final, name),
                 rivals=() if described else rivals,
                 cause=_cause(name, rivals),
             )
         )
-    for effect in decision.measured:
+    for effect in seen:
         total = float(np.sqrt(found.final.mean_square))
         out.append(
             Finding(
