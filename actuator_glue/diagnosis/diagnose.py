@@ -48,7 +48,7 @@ def diagnose(
         each: refits candidates and evaluates draws: `map`, or that of a pool of threads.
         progress: called with (stage, share of the whole that is done, in [0, 1]).
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
-        settings: thresholds.
+        settings: what a caller may set; usual ones if not given.
         before: what was known of the machine before.
 
     Raises:
@@ -72,10 +72,10 @@ def diagnose(
     ready = prepare(records, held, known)
     some = hold_and_stiffness.stretched(ready.fit)
     given = base_fit(some)
-    look = FirstLook.of(some, given, settings)
+    look = FirstLook.of(some, given)
     if first_look is not None:
         first_look(look)
-    other = hold_and_stiffness.find(ready.fit, settings, given=given)
+    other = hold_and_stiffness.find(ready.fit, given)
     if other is not None and other.runs_linearly:
         # The search starts with the likelier hold and decides between both at its end.
         ready, other = ready.with_hold('linear', replace(other, taken=True)), None
@@ -84,13 +84,13 @@ def diagnose(
     # The error of a wrong set-up is not the actuator's: it is not searched for effects.
     reach = as_given if other is not None and other.enough else conclude
     result = reach(ready, settings, each, tell, effort)
-    drawn = sampled(result, settings, np.random.default_rng([seed, 1]), each, tell)
+    drawn = sampled(result, settings.evaluations, np.random.default_rng([seed, 1]), each, tell)
     tell('held-out', 0.0)
     both = both_parts.of(drawn, other, seed, each)
     used = None
     if prior is not None and known is not None:
         p_value = known.conflict(drawn.after.draws).p_value
         used = prior.used(known.components, known.quality, p_value)
-    found = told(drawn, both, settings, used, seed, each)
+    found = told(drawn, both, settings.false_alarms, used, seed, each)
     tell('done', 1.0)
     return found

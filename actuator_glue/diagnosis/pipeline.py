@@ -40,7 +40,7 @@ def conclude(
 
     Args:
         prepared: the records.
-        settings: thresholds.
+        settings: what a caller may set.
         each: refits candidates, several at a time if it can.
         tell: takes progress.
         effort: cost of the search so far, and its limit.
@@ -59,7 +59,7 @@ def as_given(
 ) -> Conclusion:
     """Conclude from Eq. (2), alone and with each single effect, without any further search."""
     tell('base fit', 0.0)
-    prepared, refits, line = _begun(prepared, settings, each, effort, fixed=True)
+    prepared, refits, line = _begun(prepared, each, effort, fixed=True)
     return searched(prepared, refits, line, replace(settings, most=0), tell)
 
 
@@ -73,7 +73,7 @@ def _within(
     none, these are removed, or restored, and the search goes on from there.
     """
     asking.tell('base fit', 0.0)
-    begun = _begun(prepared, asking.settings, each, effort, fixed)
+    begun = _begun(prepared, each, effort, fixed)
     begun, named = _judged_again(begun, _named(begun, asking), asking)
     moved = follow(named, WITHIN, asking)
     if moved.found is named.found:
@@ -90,20 +90,18 @@ def _judged_again(begun: _Begun, result: Conclusion, asking: Asking) -> tuple[_B
     if clean is prepared or not final_impulses.swayed(final.fit, result.scorer, taken):
         return begun, result
     refits = begun.refits
-    begun = _begun(clean, asking.settings, refits.each, refits.effort, fixed=True)
+    begun = _begun(clean, refits.each, refits.effort, fixed=True)
     return begun, _named(begun, asking, result)
 
 
-def _begun(
-    prepared: Prepared, settings: Thresholds, each: Each, effort: Effort, fixed: bool
-) -> _Begun:
+def _begun(prepared: Prepared, each: Each, effort: Effort, fixed: bool) -> _Begun:
     names = *mean_effects(), *prepared.also
     refits = Refits(prepared.fit, names, each, effort=effort)
     line = hum.find(prepared.fit, refits.base().error)
     if line is not None:
         data = hum.without(prepared.fit, line)
         refits = Refits(data, names, each, effort=effort)
-    return _Begun(*undetermined_motion.without(prepared, refits, settings, fixed), line)
+    return _Begun(*undetermined_motion.without(prepared, refits, fixed), line)
 
 
 def _named(begun: _Begun, asking: Asking, before: Conclusion | None = None) -> Conclusion:

@@ -1,7 +1,7 @@
 """Thresholds of a diagnosis: what counts as material, as decisive, as explained.
 
-Settings that a caller may change, then limits of decisions that are fixed: each with its reason
-and, where it was measured, the machines that it came from. None of these machines judges.
+What a caller may set, then limits of decisions that are fixed: each with its reason and, where it
+was measured, the machines that it came from (docs/scores.md). None of these machines judges.
 Numerical settings (iterations, tolerances, grids) stand where they are used.
 """
 
@@ -13,58 +13,58 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """Thresholds, calibrated on benchmark seeds that are not reported (docs/scores.md).
+    """What a caller may set.
 
     Attributes:
-        noise_share: an effect is material where it removes more than this share of the noise rms,
-        stroke_share: and more than this share of the command's amplitude.
-        later_share: where most is explained, a further effect must remove this share of what was.
         false_alarms: probability of an addition on a healthy machine (score/false_alarms.py).
-        nats: smallest out-of-sample evidence for another set-up or a generic surrogate.
-        tie_nats: two effects cannot be told apart where their weights differ by less.
-        tie_share: between equations for the same thing an error of this share of what they remove
-            costs a nat.
-        left_noise: unexplained means that material structure is left above this share of the noise
-        left_share: and above this share of the structure found at first;
-        beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
-            explains more than the names do (0.28 of the noise is found in noise alone).
         most: most effects added.
-        beam: structures of one effect carried on to two; one fewer with each further effect.
         evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
-        tried: refits per structure after the first stage, best screened first.
-        terms: the same for learned terms.
         effort: work of all refits after which no further search is begun (diagnosis/effort.py).
         use_force: the recorded force chooses among tied names (search/force_ranking.py).
     """
 
-    noise_share: float = 0.5
-    stroke_share: float = 1e-3
-    later_share: float = 0.08
     false_alarms: float = 0.01
-    nats: float = 10.0
-    tie_nats: float = 4.0
-    tie_share: float = 0.03
-    left_noise: float = 0.6
-    left_share: float = 0.3
-    beaten_noise: float = 0.3
-    beaten_share: float = 0.15
     most: int = 6
-    beam: int = 3
-    tried: int = 5
-    terms: int = 4
     evaluations: int = 12_000
     effort: float = 7e7
     use_force: bool = False
 
-    def material(self, noise: float, stroke: float) -> float:
-        """Return the least rms error that matters [m].
 
-        Args:
-            noise: rms of what no structure explains [m].
-            stroke: amplitude of the command [m].
-        """
-        return max(self.noise_share * noise, self.stroke_share * stroke)
+# An effect is material where it removes more than this share of the noise rms, and more than this
+# share of the command's amplitude.
+NOISE_SHARE: Final = 0.5
+STROKE_SHARE: Final = 1e-3
 
+
+def least_material(noise: float, stroke: float) -> float:
+    """Return the least rms error that matters [m].
+
+    Args:
+        noise: rms of what no structure explains [m].
+        stroke: amplitude of the command [m].
+    """
+    return max(NOISE_SHARE * noise, STROKE_SHARE * stroke)
+
+
+# Where most is explained, a further effect must remove this share of what was.
+LATER_SHARE: Final = 0.08
+# Smallest out-of-sample evidence for another set-up or a generic surrogate.
+NATS: Final = 10.0
+
+# Unexplained means that material structure is left above this share of the noise and above this
+# share of the structure found at first;
+LEFT_NOISE: Final = 0.6
+LEFT_SHARE: Final = 0.3
+# the same where a generic surrogate explains more than the names do (0.28 of the noise is found in
+# noise alone).
+BEATEN_NOISE: Final = 0.3
+BEATEN_SHARE: Final = 0.15
+
+# Structures of one effect carried on to two; one fewer with each further effect.
+BEAM: Final = 3
+# Refits per structure after the first stage, best screened first; the same for learned terms.
+TRIED: Final = 5
+TERMS: Final = 4
 
 # The weight of a structure (score/weights.py): error that costs a nat, over what matters. A tenth
 # of what matters costs four; with twice this value friction's shape was lost, with ten times a
@@ -94,6 +94,10 @@ UNDERSTATED: Final = 6.0
 # removes less is not worth finishing.
 WORTH_FINISHING: Final = 0.9
 
+# Two effects cannot be told apart where their weights differ by less [nats].
+TIE_NATS: Final = 4.0
+# Between equations for the same thing an error of this share of what they remove costs a nat.
+TIE_SHARE: Final = 0.03
 # Of what the best removes: a rival that removes less is not tied, whatever its weight.
 TIED: Final = 0.5
 # Effects too small to be told, at most, whose sizes are free beside those told.
@@ -111,8 +115,6 @@ POINTING: Final = 0.3
 
 # Times the other set-up's mean square: more than half of the error is the set-up's.
 SETUP_FAR: Final = 2.0
-# Structure before an onset, over the noise, at most: as `left_noise`.
-QUIET: Final = 0.6
 # Share of the squared error that impulses must carry to have swayed a search: two per cent of it
 # are one per cent of the rms error. Or the standard deviations that they move a parameter by.
 SWAYING: Final = 0.02

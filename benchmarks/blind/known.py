@@ -49,7 +49,7 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     from actuator_glue.diagnosis.refits.refits import Refits
     from actuator_glue.diagnosis.samples.preparation import prepare
     from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
-    from actuator_glue.diagnosis.thresholds import Thresholds
+    from actuator_glue.diagnosis.thresholds import least_material
     from actuator_glue.inference.least_squares.fit import fit
     from actuator_glue.inference.least_squares.space import Space
     from actuator_glue.model.effects import CATALOGUE
@@ -74,16 +74,14 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     splits = splits_of(data, found.error)
     scorer = Scorer.of(data, splits)
     scorer = replace(scorer, data=replace(data, finer=not model.linear))  # as a diagnosis does
-    refits, limits = Refits(data, mean_effects()), Thresholds()
+    refits = Refits(data, mean_effects())
     refits.base()
-    material = max(
-        limits.noise_share * pooled(data, splits)[1], limits.stroke_share * refits.scale().stroke
-    )
+    matters = least_material(pooled(data, splits)[1], refits.scale().stroke)
     draws = posterior.sample(
         model,
         found,
         scorer,
-        beside=beside(responses(refits, material), model.effects, scorer),
+        beside=beside(responses(refits, matters), model.effects, scorer),
         rng=np.random.default_rng(seed),
         evaluations=evaluations,
         progress=lambda share: None,

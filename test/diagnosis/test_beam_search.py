@@ -11,7 +11,7 @@ from actuator_glue.diagnosis.refits.candidates import mean_effects
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import TRIED, Thresholds
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -139,7 +139,7 @@ def test_what_was_not_tried_is_screened_beside_the_members(rng_seed: int) -> Non
     for name in ('coulomb-friction', 'clock-skew'):
         current = refits.add(current, name)
     found.renoise(refits.finished(current))
-    current, most = refits.trial(current.effects), found.settings.tried
+    current, most = refits.trial(current.effects), TRIED
     alone = refits.promises.best(current, set(refits.names) - set(current.effects))[:most]
     tried = {t.added for t in found.overlooked(current)}
     assert len(tried) == most

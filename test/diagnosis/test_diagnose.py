@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis import thresholds
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.search import fitting_verdict
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.commands import sweep
@@ -21,7 +23,12 @@ THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 T = np.arange(int(24 * RATE)) / RATE
 SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
 QUICK = Thresholds(evaluations=0)
-SHARP = replace(QUICK, noise_share=0.4)
+
+
+@pytest.fixture
+def sharp(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four tenths of the noise matter, not half."""
+    monkeypatch.setattr(thresholds, 'NOISE_SHARE', 0.4)
 
 
 def make(
@@ -167,14 +174,14 @@ def test_play_is_named_and_removed() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'sharp')
 def test_a_name_that_a_regression_beats_is_doubted() -> None:
     """A command gain that depends on its rate: no effect of the catalogue, small enough to pass.
 
     A linear effect is named for it; what v|v| explains by 50 nats and more better than the name
     is not the name's doing.
     """
-    found = diagnose(rate_gain(), settings=SHARP)
+    found = diagnose(rate_gain(), settings=QUICK)
     assert found.verdict == 'unexplained'
     assert not found.complete
     # It takes error away and stays, but it is said that it may stand for something else.
@@ -185,9 +192,10 @@ def test_a_name_that_a_regression_beats_is_doubted() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures('sharp')
 def test_what_a_regression_explains_better_is_described() -> None:
     """Of all forms the right one is learned: half a second per metre."""
-    found = diagnose(rate_gain(), settings=SHARP)
+    found = diagnose(rate_gain(), settings=QUICK)
     assert [e.name for e in found.effects] == ['learned-command-u-absr']
     assert found.complete
     # The gradient over two samples is less than the rate over one.
@@ -195,10 +203,11 @@ def test_what_a_regression_explains_better_is_described() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures('few_forms')
-def test_without_the_surrogate_the_name_is_trusted() -> None:
+@pytest.mark.usefixtures('few_forms', 'sharp')
+def test_without_the_surrogate_the_name_is_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is doubted of the same machine is the surrogate's doing."""
-    trusting = diagnose(rate_gain(), settings=replace(SHARP, beaten_share=1.0))
+    monkeypatch.setattr(fitting_verdict, 'BEATEN_SHARE', 1.0)
+    trusting = diagnose(rate_gain(), settings=QUICK)
     assert trusting.verdict == 'missing-effect'
 
 

@@ -37,7 +37,7 @@ def decided(data: Data, names: tuple[str, ...]) -> tuple[Selection, Selection, t
     """Return what the displacement says, and what both say, with the notes."""
     refits = Refits(data, names)
     found = BeamSearch(refits, SETTINGS, lambda stage, share: None).run()
-    return found, *force_ranking.decided(refits, found, SETTINGS)
+    return found, *force_ranking.decided(refits, found)
 
 
 def test_the_force_chooses_among_tied_names(rng_seed: int) -> None:

@@ -47,7 +47,7 @@ def given(records: list[Record], *stiffness: float) -> list[Record]:
 def test_stiffnesses_of_the_wrong_records_are_put_right(truth: tuple[float, ...]) -> None:
     """The first record's with the last one's; Eq. (2) alone is enough then."""
     wrong = [truth[-1], *truth[1:-1], truth[0]]
-    other = find(prepare(given(machine(*truth), *wrong), []).fit, Thresholds())
+    other = find(prepare(given(machine(*truth), *wrong), []).fit)
     assert other is not None and other.enough
     assert (other.stiffness, other.changed) == (truth, ('stiffness',))
     assert other.error == pytest.approx(1e-5, rel=0.1)
@@ -58,7 +58,7 @@ def test_both_may_be_wrong() -> None:
     """Exchanged stiffnesses of commands that run linearly."""
     records = machine(0.0, 250e3, hold='linear')
     wrong = [replace(r, hold='zoh') for r in given(records, 250e3, 0.0)]
-    other = find(prepare(wrong, []).fit, Thresholds())
+    other = find(prepare(wrong, []).fit)
     assert other is not None and other.changed == ('stiffness', 'hold')
     assert set(other.hold) == {'linear'} and other.stiffness == (0.0, 250e3)
 
@@ -66,7 +66,7 @@ def test_both_may_be_wrong() -> None:
 def test_a_held_command_that_was_given_as_linear_is_told() -> None:
     """A delay of half a sample is what it looks like otherwise."""
     wrong = [replace(r, hold='linear') for r in machine(0.0, 250e3)]
-    other = find(prepare(wrong, []).fit, Thresholds())
+    other = find(prepare(wrong, []).fit)
     assert other is not None and (other.changed, set(other.hold)) == (('hold',), {'zoh'})
 
 
@@ -82,7 +82,7 @@ def test_a_command_that_ran_linearly_is_begun_with() -> None:
 def test_a_lead_of_about_half_a_sample_is_the_other_hold() -> None:
     """A transducer's lag too small to matter made it a lead, which has a size to fit it with."""
     records = machine(0.0, 250e3, hold='linear', effect='sensor-lag', size=3e-4)
-    other = find(prepare([replace(r, hold='zoh') for r in records], []).fit, Thresholds())
+    other = find(prepare([replace(r, hold='zoh') for r in records], []).fit)
     assert other is not None and other.runs_linearly and other.enough
 
 
@@ -104,7 +104,7 @@ def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> No
 def test_a_displacement_ahead_of_its_command_is_told(hold: Hold) -> None:
     """By 7.3 ms, nearly a sample; the other hold, which is a lead of half a sample, is not."""
     records = machine(0.0, 250e3, hold=hold, effect='lead', size=7.3e-3)
-    other = find(prepare(records, []).fit, Thresholds())
+    other = find(prepare(records, []).fit)
     assert other is not None and other.leads and other.enough
     assert (other.lead, set(other.hold)) == (pytest.approx(7.3e-3, rel=0.02), {hold})
     assert f'with the displacement {1e3 * other.lead:.3g} ms ahead of' in other.sentence()
@@ -119,7 +119,7 @@ def test_a_set_up_that_is_right_stays(effect: str) -> None:
     """Of a machine that Eq. (2) describes, and of one with play."""
     for seed in range(3):
         records = machine(0.0, 250e3, effect=effect, seed=seed)
-        assert find(prepare(records, []).fit, Thresholds()) is None
+        assert find(prepare(records, []).fit) is None
 
 
 def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
@@ -137,7 +137,7 @@ def test_a_lead_is_held_against_an_effect(monkeypatch: pytest.MonkeyPatch) -> No
     case = import_module('far').build(99043, effect='gain-drift')
     rows = zip(case.commands, case.measured, case.stiffness, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k) for u, y, k in rows]
-    other = find(prepare(records[:2], []).fit, Thresholds())
+    other = find(prepare(records[:2], []).fit)
     assert other is not None and other.leads and other.enough
     found = diagnose(records[:2], records[2], settings=Thresholds(evaluations=0))
     assert found.structure == ('gain-drift',) == tuple(case.effects)

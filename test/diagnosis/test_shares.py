@@ -11,7 +11,6 @@ from scipy import stats
 from actuator_glue.diagnosis.score import false_alarms
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
 from actuator_glue.diagnosis.search import ties
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdict import rules
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
@@ -88,7 +87,7 @@ def test_shares_are_odds_that_sum_to_one() -> None:
     rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, even)
     two = trial('viscous-damping + delay', 10e-6, even - 1.0)
     one = trial('delay', 37e-6, even)
-    found = ties.compare(rest, best, [one, two], (0.1, 0.5, 0.4), level, Thresholds())
+    found = ties.compare(rest, best, [one, two], (0.1, 0.5, 0.4), level)
     assert [r.name for r in found] == ['payload-inertia', 'viscous-damping + delay', 'delay']
     assert [r.probability for r in found] == pytest.approx([0.5, 0.25, 0.05])
     assert found[1].effects == ('viscous-damping', 'delay')
@@ -103,5 +102,5 @@ def test_what_has_next_to_no_weight_is_no_alternative() -> None:
     rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('delay', 10e-6, even)
     rivals = trial('sensor-lag', 10e-6, even), trial('valve-lag', 10e-6, even)
     odds = (np.exp(-3.9), np.exp(-4.1), 0.0)
-    found = ties.compare(rest, best, rivals, odds, level, Thresholds())
+    found = ties.compare(rest, best, rivals, odds, level)
     assert [r.tied for r in found] == [True, True, False]

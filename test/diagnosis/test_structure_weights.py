@@ -9,7 +9,6 @@ from trials import entries, trial
 
 from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.search.judge import Judge
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.effects import CATALOGUE
@@ -25,6 +24,10 @@ class Left:
         """Have every effect to choose from."""
         self.entries = entries()
 
+    def price(self, structure: Structure) -> float:
+        """Return what a structure costs besides its error [nats]."""
+        return price(structure, self.entries, len(self.names))
+
     @property
     def scorer(self) -> 'Left':
         """The one that scores."""
@@ -38,7 +41,7 @@ class Left:
 @pytest.fixture
 def judge() -> Judge:
     """One to whom 10 um matter."""
-    found = Judge(Left(), Thresholds())
+    found = Judge(Left())
     found.material = 1e-5
     return found
 

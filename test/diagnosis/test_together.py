@@ -7,7 +7,7 @@ from actuator_glue.diagnosis.moves import two_effects
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import LEFT_NOISE
 
 NAMES = ('delay', 'supply-droop', 'viscous-damping', 'gain-drift', 'bias')
 DELAY, DROOP = 8e-3, 6.0  # together some 8 um, each alone less than 3
@@ -24,7 +24,7 @@ def test_two_that_hide_each_other_are_found() -> None:
     """Of 25 machines 0.76 to 0.85 of the noise was left; alone half of what matters goes."""
     beam, found = selected(DELAY, DROOP)
     assert found.final.effects == ()
-    assert found.left > Thresholds().left_noise * found.noise
+    assert found.left > LEFT_NOISE * found.noise
     assert all(removed(found.base, t) < found.material for t in found.singles)
     chosen = two_effects.explained(beam, found)
     assert chosen is not None

@@ -14,7 +14,7 @@ from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import NOISE_SHARE
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import Data
@@ -22,9 +22,7 @@ from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.records import Array
 
 
-def find(
-    data: Data, found: Selection, settings: Thresholds, line: Line | None
-) -> tuple[Measured, ...]:
+def find(data: Data, found: Selection, line: Line | None) -> tuple[Measured, ...]:
     """Return the measurement effects that are significant and material.
 
     An effect must be material in the samples as recorded; its rms is that of its remainder in the
@@ -33,7 +31,6 @@ def find(
     Args:
         data: counted samples.
         found: the effects of the motion, fitted to them.
-        settings: thresholds.
         line: hum that was removed from the data before.
     """
     error = found.final.fit.error
@@ -49,7 +46,7 @@ def find(
     if line is not None:
         errors = hum.regressed(whole, errors, line)
     noise = float(np.sqrt(max(np.mean(errors**2) - found.left**2, found.noise**2)))
-    material = max(settings.noise_share * noise, found.material)
+    material = max(NOISE_SHARE * noise, found.material)
     seen = measurement.find(whole, errors, material, line)
     return tuple(
         m if m.name == 'hum' else replace(m, rms=_left(m, data, whole.target - errors))

@@ -19,7 +19,7 @@ class Asking:
     """What moves work with.
 
     Attributes:
-        settings: thresholds.
+        settings: what a caller may set.
         tell: takes progress.
         conclude: searches records from the beginning, with the counted samples fixed.
     """

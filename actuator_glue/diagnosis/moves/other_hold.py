@@ -14,7 +14,6 @@ from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
-from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.search import table
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.inference.least_squares.fit import Fit, fit
@@ -69,7 +68,7 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
         starts = np.stack([trial.fit.theta, trial.fit.theta])
         starts[1, : len(base.theta)] = base.theta
         again = first.effort.spent_on(fit(data, trial.structure, starts))
-        cost = price(trial.structure, refits.entries, len(refits.names))
+        cost = refits.price(trial.structure)
         row = table.row(trial.structure, trial.effects, again, first.scorer, cost)
         row = replace(row, left_out=math.hypot(row.left_out, line))
         if first.prepared.setup is None:

@@ -16,7 +16,6 @@ from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.search.gains import removed
@@ -91,7 +90,7 @@ def _row(refits: Refits, trial: Trial, rest: Structure, tried: int) -> Row:
     """Return the row of a structure with one record's own setting, one of `tried`."""
     assert refits.scorer is not None and isinstance(trial.model, OneRecord)
     more = len(trial.model.parameters) - len(rest.parameters)
-    cost = price(rest, refits.entries, len(refits.names)) + more + float(np.log(tried))
+    cost = refits.price(rest) + more + float(np.log(tried))
     return row(trial.model, trial.effects, trial.fit, refits.scorer, cost, trial.model.scope)
 
 
@@ -128,7 +127,7 @@ def _attribution(
     nearest = {t.added: t for t in reversed(tried)}  # the record that each fits best
     others = [t for name, t in nearest.items() if name != best.added]
     odds = beam.odds(start, best, others)
-    rivals = compare(start, best, others, odds, refits.scorer, beam.settings)
+    rivals = compare(start, best, others, odds, refits.scorer)
     gained = evidence(best.scores, start.scores)
     kept = {n: found.rivals[n] for n in start.effects}
     return replace(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.companions import beside
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import SEEN
+from actuator_glue.diagnosis.thresholds import SEEN, TRIED
 from actuator_glue.diagnosis.trial import Trial
 
 
@@ -55,7 +55,7 @@ def _better(beam: BeamSearch, with_more: Trial, name: str, best: Trial) -> Trial
     """
     refits = beam.refits
     rest = refits.without(with_more, name)
-    names = refits.promises.best(rest, refits.others(with_more))[: beam.settings.tried]
+    names = refits.promises.best(rest, refits.others(with_more))[:TRIED]
     for trial in refits.additions(rest, names, below=with_more.mean_square):
         enough = beam.left(trial) < beam.material
         # Each of the two must matter beside the other.

@@ -23,7 +23,6 @@ from actuator_glue.diagnosis.search import companions
 from actuator_glue.diagnosis.search.conclusion import Conclusion
 from actuator_glue.diagnosis.search.ties import tied_structures
 from actuator_glue.diagnosis.stages import Progress, Stage
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdicts import COMPLETE
 from actuator_glue.inference.at_bound import Pressed, pressed
@@ -123,13 +122,13 @@ class AnswerPosterior:
 
 
 def sampled(
-    result: Conclusion, settings: Thresholds, rng: np.random.Generator, each: Each, tell: Progress
+    result: Conclusion, evaluations: int, rng: np.random.Generator, each: Each, tell: Progress
 ) -> AnswerPosterior:
     """Draw the posterior of an answer.
 
     Args:
         result: the answer of the fitting part.
-        settings: thresholds.
+        evaluations: of the likelihood by chains of one structure, at most.
         rng: random numbers.
         each: evaluates draws, several at a time if it can.
         tell: takes progress.
@@ -140,7 +139,7 @@ def sampled(
     size = max(found.material, decision.left)
     small = {} if final.own is not None else discrepancy.responses(refits, size)
 
-    def sample(trial: Trial, evaluations: int = 0, stage: Stage = 'posterior') -> Draws:
+    def sample(trial: Trial, most: int = 0, stage: Stage = 'posterior') -> Draws:
         finer = trial.own is None and not trial.structure.linear
         return posterior.sample(
             trial.model,
@@ -148,7 +147,7 @@ def sampled(
             replace(scorer, data=replace(scorer.data, finer=finer)),
             beside=discrepancy.beside(small, trial.effects, scorer),
             rng=rng,
-            evaluations=evaluations,
+            evaluations=most,
             progress=partial(tell, stage),
             each=each,
         )
@@ -161,7 +160,7 @@ def sampled(
     if final.effects:
         # Where structure is left, wrong equations widen intervals more than long chains would.
         whole = decision.verdict in COMPLETE
-        draws = sample(final, settings.evaluations // (1 if whole else 4))
+        draws = sample(final, evaluations // (1 if whole else 4))
         after = Side(final.model, final.fit.theta, draws.points)
     out = AnswerPosterior(
         result, before, after, draws, draws, MixedDraws.of(draws.points, final.effects), final,
@@ -177,7 +176,7 @@ def sampled(
     mixture = out.mixture
     if out.larger is not final:
         known = posterior.identified(out.space, draws.points, out.ridge).tolist()
-        wider = sample(out.larger, settings.evaluations)
+        wider = sample(out.larger, evaluations)
         unmet = reduced(wider, out.larger, final, known).unmet
         if any(k and u for k, u in zip(known, unmet, strict=True)):
             # Chains that lose what the records fix say nothing of what is too small to matter.

@@ -19,6 +19,7 @@ from actuator_glue.diagnosis.refits import global_search, poles
 from actuator_glue.diagnosis.refits.candidates import FEEDBACK, structure_of
 from actuator_glue.diagnosis.refits.promises import Promises
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
+from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -130,6 +131,10 @@ class Refits:
     def structure(self, *effects: str) -> Structure:
         """Return the structure of these effects, in their order."""
         return structure_of(self.entries, effects)
+
+    def price(self, structure: Structure) -> float:
+        """Return what a structure costs besides its error [nats]."""
+        return price(structure, self.entries, len(self.names))
 
     def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
         """Score an already refitted structure with the current noise."""

@@ -17,7 +17,7 @@ import numpy as np
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import log_weight
-from actuator_glue.diagnosis.thresholds import MATTERING, SETUP_FAR, Thresholds
+from actuator_glue.diagnosis.thresholds import MATTERING, NATS, SETUP_FAR, least_material
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
 from actuator_glue.inference.least_squares.stretches import stretches
@@ -139,12 +139,11 @@ class WrongSetup(JsonObject):
         return f'check the set-ups: with {" and ".join(parts)} {alone}'
 
 
-def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSetup | None:
+def find(data: Data, given: Fit | None = None) -> WrongSetup | None:
     """Return a set-up that explains records far better than the one given; None for none.
 
     Args:
         data: the fitting part.
-        settings: thresholds.
         given: Eq. (2) fitted to `stretched(data)`, where that is known.
     """
     some = stretched(data)
@@ -152,7 +151,7 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     stroke = scale(some.records, given.theta).stroke
     left, noise = pooled(some, splits_of(some, given.error))
     # Under a stationary command structure passes for noise: there, little of it says nothing.
-    if left < settings.material(noise, stroke) and not any(forecast.stationary(some)):
+    if left < least_material(noise, stroke) and not any(forecast.stationary(some)):
         return None
     others = list(_others(data))
     parts = [stretched(other) for other in others]
@@ -161,13 +160,13 @@ def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSet
     ahead = some, _ahead(some, given)
     part, found = min(ways[best], ahead, key=lambda way: way[1].rms)
     noise = pooled(part, splits_of(part, found.error))[1]
-    material = settings.material(noise, stroke)
+    material = least_material(noise, stroke)
     # A lead of half a sample is the other hold: what it is beyond that must matter.
     leads = _weight(ahead[1], material) > _weight(ways[best][1], material)
     part, found = ahead if leads else ways[best]
     if given.rms**2 - found.rms**2 < max(material**2, (SETUP_FAR - 1.0) * found.rms**2):
         return None
-    if _nats(part, found, given) < settings.nats + math.log(len(ways) + 1):
+    if _nats(part, found, given) < NATS + math.log(len(ways) + 1):
         return None
     return WrongSetup.between(
         data,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.score.scorer import pooled, splits_of
 from actuator_glue.diagnosis.score.weights import log_weight
-from actuator_glue.diagnosis.thresholds import MATTERING, QUIET
+from actuator_glue.diagnosis.thresholds import LEFT_NOISE, MATTERING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import SETTLE, Data, Mask
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
@@ -151,7 +151,7 @@ def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
 def quiet(before: Data, error: Array) -> bool:
     """Whether what a fit leaves of the data before a moment is noise."""
     left, noise = pooled(before, splits_of(before, error))
-    return left <= QUIET * noise
+    return left <= LEFT_NOISE * noise
 
 
 def enough_before(

@@ -20,11 +20,17 @@ from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import SearchStep, Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
 from actuator_glue.diagnosis.thresholds import (
+    BEAM,
+    BEATEN_NOISE,
     FAR,
+    LATER_SHARE,
+    LEFT_SHARE,
     MOST_TERMS,
     NAMES_FIRST,
     PROMISED,
     SEEN,
+    TERMS,
+    TRIED,
     Thresholds,
 )
 from actuator_glue.diagnosis.trial import Trial
@@ -40,13 +46,13 @@ class BeamSearch(Judge):
 
     Args:
         refits: the structures.
-        settings: thresholds.
+        settings: what a caller may set.
         progress: takes progress.
     """
 
     def __init__(self, refits: Refits, settings: Thresholds, progress: Progress) -> None:
-        super().__init__(refits, settings)
-        self.progress = progress
+        super().__init__(refits)
+        self.settings, self.progress = settings, progress
 
     def apart(self) -> BeamSearch:
         """Return a copy with additions and noise of its own; it shares only the effort."""
@@ -65,7 +71,7 @@ class BeamSearch(Judge):
         asked = []
         for current in beam:
             names = self.refits.promises.best(current, self.refits.others(current))
-            names = names[: self.settings.tried]
+            names = names[:TRIED]
             if stage > NAMES_FIRST:
                 names += self.promising_terms(current)
             asked.append(Asked(current, tuple(names)))
@@ -100,7 +106,7 @@ class BeamSearch(Judge):
             return ()
         names = [n for n in self.refits.terms() if n not in current.effects]
         promised = self.refits.promises.left(current, names)
-        best = [n for n, left in promised if left < PROMISED * below][: self.settings.terms]
+        best = [n for n, left in promised if left < PROMISED * below][:TERMS]
         held = (self.refits.entries[n].holds for n in best)
         plainer = [h[0] for h in held if h is not None and h[0] not in current.effects]
         return tuple(dict.fromkeys((*best, *plainer)))
@@ -116,7 +122,7 @@ class BeamSearch(Judge):
 
     def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
         """Return the effects that promise most beside the present ones."""
-        return self.refits.promises.best(current, names, beside=True)[: self.settings.tried]
+        return self.refits.promises.best(current, names, beside=True)[:TRIED]
 
     def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
         """Refit a structure roughly with each further effect; finish those that may matter."""
@@ -177,10 +183,10 @@ class BeamSearch(Judge):
             ranked: structures with one more effect, best first; empty tries promising ones.
             begun: steps that led here; empty when another search is continued.
         """
-        s, steps, described = self.settings, list(begun), False
+        most, steps, described = self.settings.most, list(begun), False
         current, threshold = self.refits.trial(current.effects, current.added), self.material
         base, singles = self.refits.trial(()), list(singles)
-        for stage in range(len(current.effects) + 1, s.most + 1):
+        for stage in range(len(current.effects) + 1, most + 1):
             best = self._first_worth(ranked, current, threshold)
             open_ = self.left(current) >= self.material and not self.refits.effort.over
             if best is None and open_:
@@ -195,14 +201,14 @@ class BeamSearch(Judge):
             steps.append(SearchStep.to(current, f'with {best.added}'))
             base, singles = self.refits.trial(()), self.rescored(singles)
             threshold = self.material
-            if self.left(current) < max(threshold, s.left_share * self.first):
+            if self.left(current) < max(threshold, LEFT_SHARE * self.first):
                 # Most is explained: a small gain may only correct the form of an effect found.
-                threshold = max(threshold, s.later_share * removed(base, current))
-            if self.left(current) < self.material or stage == s.most or self.refits.effort.over:
+                threshold = max(threshold, LATER_SHARE * removed(base, current))
+            if self.left(current) < self.material or stage == most or self.refits.effort.over:
                 break
             if stage == NAMES_FIRST and (described := self.explained_by_term(current)):
                 break
-            width = max(1, s.beam + 1 - stage)  # the more effects, the fewer alternatives
+            width = max(1, BEAM + 1 - stage)  # the more effects, the fewer alternatives
             ranked = self.extend(self.rescored(ranked[:width]), stage + 1)
             if ranked and self.left(current) >= self.material:
                 self.renoise(self._nearest(ranked))
@@ -274,7 +280,7 @@ class BeamSearch(Judge):
         if exchanged:
             for name in current.effects:
                 current = self.refits.polish(replace(current, added=name))
-            rest = self.left(current) >= self.settings.beaten_noise * self.noise
+            rest = self.left(current) >= BEATEN_NOISE * self.noise
             current, rivals = self.settle(self.refits.finished(current, finely=rest))
         else:
             rivals = self._known_rivals(current)
@@ -299,7 +305,7 @@ class BeamSearch(Judge):
             exchange, only the known ones.
         """
         complete = self.left(current) < self.material
-        most = self.settings.tried if complete else _OPEN_TRIED
+        most = TRIED if complete else _OPEN_TRIED
         for _ in range(_SWAPS if complete else _OPEN):
             rests = self.refits.without_each(current)
             in_place = self._in_place(current, rests, most, complete)
@@ -366,4 +372,4 @@ class BeamSearch(Judge):
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
             )
-        return compare(rest, replace(best, added=name), trials, odds, scorer, self.settings)
+        return compare(rest, replace(best, added=name), trials, odds, scorer)

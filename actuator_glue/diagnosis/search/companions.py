@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
-from actuator_glue.diagnosis.thresholds import COMPANIONS, GROUP_ALONE, SEEN
+from actuator_glue.diagnosis.thresholds import COMPANIONS, GROUP_ALONE, SEEN, TRIED
 from actuator_glue.diagnosis.trial import Trial
 
 
@@ -84,7 +84,7 @@ def beside(beam: BeamSearch, current: Trial, names: Sequence[str], least: float)
         least: error that an effect must remove [m]; those that remove less are refitted roughly.
     """
     refits = beam.refits
-    ranked = refits.promises.best(current, names)[: beam.settings.tried]
+    ranked = refits.promises.best(current, names)[:TRIED]
     below = current.mean_square - least**2
     return refits.additions(current, ranked, valves=False, below=below)
 

@@ -158,12 +158,12 @@ def concluded(
         found: its result.
         line: hum that was removed from the data before.
     """
-    refits, settings = beam.refits, beam.settings
+    refits = beam.refits
     assert refits.scorer is not None
-    seen = at_recorded_rate.find(refits.data, found, settings, line)
+    seen = at_recorded_rate.find(refits.data, found, line)
     chosen = found.final if found.final.effects else found.singles[0]
     generic = regression.compare(refits.data, refits.scorer, found.base, chosen)
-    decision = decide(found, seen, settings, generic)
+    decision = decide(found, seen, generic)
     return Conclusion(prepared, line, found, seen, generic, decision, beam, found.steps)
 
 
@@ -181,7 +181,7 @@ def searched(
         prepared: the records.
         refits: refits structures to the fitting part.
         line: hum that was removed from the data before.
-        settings: thresholds.
+        settings: what a caller may set.
         tell: takes progress.
         earlier: conclusion from the same samples, cleaned differently, to continue from.
     """
@@ -193,7 +193,7 @@ def searched(
         named = replace(named, steps=(*earlier.history, *named.steps))
     if settings.use_force:
         before = named.final
-        named, told = force_ranking.decided(refits, named, settings)
+        named, told = force_ranking.decided(refits, named)
         if named.final.effects != before.effects:
             step = SearchStep.to(named.final, 'the name that the force tells')
             named = replace(named, steps=(*named.steps, step))

@@ -10,7 +10,13 @@ from actuator_glue.diagnosis.learned.term import any_learned, is_learned
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.score.regression import Surrogate
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import (
+    BEATEN_NOISE,
+    BEATEN_SHARE,
+    LEFT_NOISE,
+    LEFT_SHARE,
+    NATS,
+)
 from actuator_glue.diagnosis.verdicts import Verdict
 
 
@@ -35,7 +41,6 @@ class Decision:
 def decide(
     found: Selection,
     seen: tuple[Measured, ...],
-    settings: Thresholds,
     surrogate: Surrogate,
 ) -> Decision:
     """Decide whether the effects found explain everything.
@@ -47,11 +52,9 @@ def decide(
     """
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
-    limit = max(
-        settings.left_noise * found.noise, found.material, settings.left_share * found.structure
-    )
-    if found.final.effects and surrogate.beats(found.material, settings.nats):
-        floor = max(settings.beaten_noise * found.noise, settings.beaten_share * found.structure)
+    limit = max(LEFT_NOISE * found.noise, found.material, LEFT_SHARE * found.structure)
+    if found.final.effects and surrogate.beats(found.material, NATS):
+        floor = max(BEATEN_NOISE * found.noise, BEATEN_SHARE * found.structure)
         limit = min(limit, floor)
     verdict: Verdict = 'none'
     if left > limit:

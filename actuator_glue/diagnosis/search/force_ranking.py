@@ -21,7 +21,7 @@ from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.search.gains import worth
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import TELLING, Thresholds
+from actuator_glue.diagnosis.thresholds import NOISE_SHARE, TELLING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, fit, rms
@@ -46,9 +46,7 @@ class Ranked:
     errors: dict[str, float]
 
 
-def decided(
-    refits: Refits, found: Selection, settings: Thresholds
-) -> tuple[Selection, tuple[str, ...]]:
+def decided(refits: Refits, found: Selection) -> tuple[Selection, tuple[str, ...]]:
     """Let the forces choose among tied names; return the choice, and notes for people."""
     notes = []
     for name in found.final.effects:
@@ -60,15 +58,13 @@ def decided(
             continue
         rivals = [replace(t, added=n) for t, n in zip(known, tied, strict=False)]
         alone = refits.without(found.final, name)
-        ranked = _ranked(refits, alone, [replace(found.final, added=name), *rivals], settings)
+        ranked = _ranked(refits, alone, [replace(found.final, added=name), *rivals])
         found = _swapped(refits, found, name, ranked)
         notes.append(_told(ranked))
-    return found, (*notes, *_unseen(refits, found, settings))
+    return found, (*notes, *_unseen(refits, found))
 
 
-def _ranked(
-    refits: Refits, rest: Trial, contenders: Sequence[Trial], settings: Thresholds
-) -> Ranked:
+def _ranked(refits: Refits, rest: Trial, contenders: Sequence[Trial]) -> Ranked:
     tried, best = [rest, *contenders], contenders[0]
     for _ in range(_WEIGHINGS):
         both = with_forces(refits.data, best.structure, best.fit.theta)
@@ -78,7 +74,7 @@ def _ranked(
 
         tried = list(refits.each(refitted, tried))
         best = min(tried[1:], key=lambda t: t.fit.rms)
-    scorer, material = _scorer(both, best.fit, settings)
+    scorer, material = _scorer(both, best.fit)
 
     def weight(trial: Trial) -> float:
         left_out = scorer.left_out_error(trial.fit)
@@ -88,18 +84,18 @@ def _ranked(
     trials.sort(key=weight, reverse=True)
     first = weight(trials[0])
     odds = [math.exp(min(weight(t) - first, 0.0)) for t in (*trials[1:], alone)]
-    rivals = compare(alone, trials[0], trials[1:], odds, scorer, settings)
+    rivals = compare(alone, trials[0], trials[1:], odds, scorer)
     size = newtons_per_metre(both)
     force = slice(refits.data.target.size, None)
     errors = {t.added: size * rms(t.fit.error[force]) for t in trials}
     return Ranked(tuple(trials), rivals, errors)
 
 
-def _scorer(both: Data, found: Fit, settings: Thresholds) -> tuple[Scorer, float]:
+def _scorer(both: Data, found: Fit) -> tuple[Scorer, float]:
     """Take both channels' noise, and the error that matters, from what a structure leaves."""
     splits = splits_of(both, found.error)
     left, noise = pooled(both, splits)
-    material = settings.noise_share * noise
+    material = NOISE_SHARE * noise
     return replace(Scorer.of(both, splits), likely=left < material), material
 
 
@@ -130,7 +126,7 @@ def _told(ranked: Ranked) -> str:
     return f'{said}; its error, of refits to both channels: {errors}'
 
 
-def _unseen(refits: Refits, found: Selection, settings: Thresholds) -> tuple[str, ...]:
+def _unseen(refits: Refits, found: Selection) -> tuple[str, ...]:
     """Name a further effect that only the force shows, if there is one."""
     final, count = found.final, refits.data.target.size
     names = [n for n in refits.names if n not in final.effects and _is_felt(refits.entries[n])]
@@ -150,11 +146,11 @@ def _unseen(refits: Refits, found: Selection, settings: Thresholds) -> tuple[str
 
     best = min(refits.each(added, names), key=lambda t: t.fit.rms)
     with_it = fit(both, best.structure, best.fit.theta)
-    scorer, _ = _scorer(both, with_it, settings)
+    scorer, _ = _scorer(both, with_it)
     nats = evidence(scorer.block_scores(with_it), scorer.block_scores(without))
     size = newtons_per_metre(both)
     before, after = (size * rms(f.error[count:]) for f in (without, with_it))
-    least = settings.noise_share * after
+    least = NOISE_SHARE * after
     if (
         nats - len(with_it.theta) + len(without.theta) < found.nats
         or before**2 - after**2 < least**2

@@ -12,10 +12,17 @@ import numpy as np
 from actuator_glue.diagnosis.refits.refits import Refits, by_score
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.score.weights import counted, log_weight, log_weights, price
+from actuator_glue.diagnosis.score.weights import counted, log_weight
+from actuator_glue.diagnosis.search import table
 from actuator_glue.diagnosis.search.gains import removed
-from actuator_glue.diagnosis.search.table import additions
-from actuator_glue.diagnosis.thresholds import MATTERING, ROUGHLY, TELLING, TOGETHER, Thresholds
+from actuator_glue.diagnosis.thresholds import (
+    NATS,
+    ROUGHLY,
+    TELLING,
+    TIE_SHARE,
+    TOGETHER,
+    least_material,
+)
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.records import Array
@@ -26,17 +33,16 @@ class Judge:
 
     Attributes:
         refits: the structures.
-        settings: thresholds.
         noise: rms of what no structure explains [m].
         first: rms structure of the residual of Eq. (2) [m].
         material: least rms error that matters [m].
         nats: evidence that any addition must have.
     """
 
-    def __init__(self, refits: Refits, settings: Thresholds) -> None:
-        self.refits, self.settings = refits, settings
+    def __init__(self, refits: Refits) -> None:
+        self.refits = refits
         self.noise = self.first = self.material = 0.0
-        self.nats = settings.nats
+        self.nats = NATS
         self._known: tuple[Fit, tuple[float, float]] | None = None
 
     def renoise(self, error_of: Trial | None = None) -> None:
@@ -46,7 +52,7 @@ class Judge:
         self.refits.scorer = scorer = Scorer.of(self.refits.data, parts)
         left, self.noise = self._apart(fit)
         self.first = self.first or left
-        self.material = self.settings.material(self.noise, self.refits.scale().stroke)
+        self.material = least_material(self.noise, self.refits.scale().stroke)
         self.refits.scorer = replace(scorer, likely=left < self.material)
 
     def left(self, trial: Trial) -> float:
@@ -64,7 +70,7 @@ class Judge:
         data, scorer = self.refits.data, self.refits.scorer
         splits = splits_of(data, fit.error)
         if any(self._stationary) and scorer is not None:
-            most = forecast.noise(self._features, scorer, fit, self.settings.nats)
+            most = forecast.noise(self._features, scorer, fit, NATS)
             splits = [
                 replace(s, noise=min(s.noise, limit)) if asked else s
                 for s, limit, asked in zip(splits, most, self._stationary, strict=True)
@@ -110,28 +116,22 @@ class Judge:
         return self._log_weight(other, tells) - self._log_weight(trial, tells)
 
     def _log_weight(self, trial: Trial, tells: float) -> float:
-        refits = self.refits
-        cost = price(trial.structure, refits.entries, len(refits.names))
-        return log_weight(self._counted(trial), tells, cost)
-
-    def _counted(self, trial: Trial) -> float:
         scorer = self.refits.scorer
         assert scorer is not None
-        return counted(scorer.left_out_error(trial.fit), trial.effects, self.material)
+        left_out = counted(scorer.left_out_error(trial.fit), trial.effects, self.material)
+        return log_weight(left_out, tells, self.refits.price(trial.structure))
 
     def heaviest(self, trials: Sequence[Trial]) -> Trial:
-        """Return the structure of the greatest weight.
-
-        While none of them is complete all are wrong, and a small difference tells nothing of them.
-        """
-        refits = self.refits
+        """Return the structure of the greatest weight."""
+        scorer = self.refits.scorer
+        assert scorer is not None
+        rows = [
+            table.row(t.structure, t.effects, t.fit, scorer, self.refits.price(t.structure))
+            for t in trials
+        ]
         nearest = min(trials, key=lambda t: t.fit.rms)
         complete = self.left(nearest) < self.material
-        errors = [self._counted(t) for t in trials]
-        costs = [price(t.structure, refits.entries, len(refits.names)) for t in trials]
-        counts = [additions(t.effects) for t in trials]
-        telling = TELLING if complete else MATTERING
-        return trials[int(np.argmax(log_weights(errors, costs, counts, self.material, telling)))]
+        return trials[int(np.argmax(table.weights(rows, self.material, complete)))]
 
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
         """Return the weights of an effect's rivals, and of no effect, relative to its own.
@@ -144,7 +144,7 @@ class Judge:
             best: with it.
             trials: with another in its place.
         """
-        alike = self.settings.tie_share * removed(rest, best)
+        alike = TIE_SHARE * removed(rest, best)
         behind = [*(self.behind(t, best, alike) for t in trials), self.behind(rest, best)]
         return [math.exp(-max(b, 0.0)) for b in behind]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer
-from actuator_glue.diagnosis.score.weights import counted, log_weights, price
+from actuator_glue.diagnosis.score.weights import counted, log_weights
 from actuator_glue.diagnosis.thresholds import MATTERING, TELLING
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
@@ -74,9 +74,8 @@ def rows(refits: Refits, scorer: Scorer) -> tuple[Row, ...]:
         refits: what was refitted.
         scorer: blocks of the fitting part.
     """
-    count = len(refits.names)
     return tuple(
-        row(model, model.effects, fit, scorer, price(model, refits.entries, count))
+        row(model, model.effects, fit, scorer, refits.price(model))
         for model, fit in refits.left_at_most(math.inf)
     )
 
@@ -145,10 +144,11 @@ def weighed(
     for r in sorted(some, key=lambda r: r.left_out):
         best.setdefault(r.key, r)
     told = scope, frozenset(effects)
-    weights = _weights(list(best.values()), material)
     found = [
         replace(r, chosen=key == told, log_weight=float(weight))
-        for (key, r), weight in zip(best.items(), weights, strict=True)
+        for (key, r), weight in zip(
+            best.items(), weights(list(best.values()), material), strict=True
+        )
     ]
     return tuple(sorted(found, key=lambda r: -r.log_weight))
 
@@ -160,14 +160,22 @@ def outweighs(other: Row, told: Row, material: float, complete: bool) -> bool:
         other: the other row.
         told: the one that is told.
         material: least rms error that matters [m].
-        complete: whether either leaves nothing that matters; else both are wrong, and a small
-            difference tells nothing of them.
+        complete: whether either leaves nothing that matters.
     """
-    first, second = _weights([told, other], material, TELLING if complete else MATTERING)
+    first, second = weights([told, other], material, complete)
     return bool(second > first)
 
 
-def _weights(some: Sequence[Row], material: float, telling: float = TELLING) -> Array:
+def weights(some: Sequence[Row], material: float, complete: bool = True) -> Array:
+    """Return the logarithms of the weights of rows (K,), the greatest 0 [nats].
+
+    Args:
+        some: the rows.
+        material: least rms error that matters [m].
+        complete: whether any leaves nothing that matters; while none does all are wrong, and a
+            small difference tells nothing of them.
+    """
+    telling = TELLING if complete else MATTERING
     errors = [counted(r.left_out, r.effects, material) for r in some]
     counts = [additions(r.effects, r.scope) for r in some]
     return log_weights(errors, [r.price for r in some], counts, material, telling)

@@ -19,7 +19,7 @@ from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, inflation
 from actuator_glue.diagnosis.search.gains import removed, standard_error
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import TIED, Thresholds
+from actuator_glue.diagnosis.thresholds import TIE_NATS, TIED
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
@@ -33,7 +33,6 @@ def compare(
     trials: Sequence[Trial],
     odds: Sequence[float],
     scorer: Scorer,
-    settings: Thresholds,
 ) -> tuple[Rival, ...]:
     """Return the rivals with their probabilities beside the best, best first.
 
@@ -43,12 +42,11 @@ def compare(
         trials: structures with another effect in its place.
         odds: weights of `trials` and `rest` relative to that of the best.
         scorer: noise that they were scored with.
-        settings: thresholds.
     """
     explained, total = removed(rest, best), 1.0 + sum(odds)
     out = [Rival(best.added, 0.0, 0.0, 0.0, True, 1.0 / total)]
     for trial, share in zip(trials, odds[:-1], strict=True):
-        near = share > math.exp(-settings.tie_nats)
+        near = share > math.exp(-TIE_NATS)
         tied = near and removed(rest, trial) > TIED * explained
         nats = max(0.0, evidence(best.scores, trial.scores))
         stderr = standard_error(best.scores - trial.scores)

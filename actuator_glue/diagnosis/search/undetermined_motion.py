@@ -18,7 +18,7 @@ from actuator_glue.diagnosis.refits import global_search
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import least_material
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.hygiene.checks import where
 from actuator_glue.inference.least_squares.data import Data, Mask
@@ -66,15 +66,12 @@ def undetermined(data: Data, model: Model, theta: Array, size: float) -> tuple[M
     return tuple(out)
 
 
-def without(
-    prepared: Prepared, refits: Refits, settings: Thresholds, fixed: bool
-) -> tuple[Prepared, Refits]:
+def without(prepared: Prepared, refits: Refits, fixed: bool) -> tuple[Prepared, Refits]:
     """Exclude samples that friction leaves to chance, where it explains most but not all.
 
     Args:
         prepared: records.
         refits: what was refitted to the fitting part, or to what hum leaves of it.
-        settings: thresholds.
         fixed: whether all counted samples stay counted.
 
     Returns:
@@ -88,7 +85,7 @@ def without(
         base = refits.trial(())
         simple = refits.polish(refits.add(base, rich.holds[0], refits.each))
         left, noise = pooled(refits.data, splits_of(refits.data, simple.fit.error))
-        size = settings.material(noise, refits.scale().stroke)
+        size = least_material(noise, refits.scale().stroke)
         if simple.mean_square > _SIMPLE * base.mean_square or left < size:
             continue
         found = _found(refits, simple, rich.name, size, fixed)

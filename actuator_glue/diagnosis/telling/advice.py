@@ -15,15 +15,13 @@ from actuator_glue.diagnosis.score.regression import Surrogate
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.telling.next_experiment import Experiment
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import TIE_NATS
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.rules import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.convergence import APART
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
-
-_TELLING = Thresholds().tie_nats
 
 
 def _where(row: Json) -> str:
@@ -149,7 +147,7 @@ def _next(experiments: Sequence[Experiment]) -> list[str]:
     if not experiments:
         return []
     best, last = experiments[0], experiments[-1]
-    if best.nats < _TELLING:
+    if best.nats < TIE_NATS:
         return [f'no test of the menu would tell tied names apart; the best is {best.sentence()}']
     return [f'to tell tied names apart record {best.sentence()}; least telling: {last.sentence()}']
 

@@ -16,7 +16,6 @@ from actuator_glue.diagnosis.telling.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.telling.remaining import remaining
 from actuator_glue.diagnosis.telling.response import Response
 from actuator_glue.diagnosis.telling.result import DiagnosisData
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdict import findings
 from actuator_glue.diagnosis.verdict.both_parts import BothParts
@@ -37,7 +36,7 @@ _RESPONSES = 400
 def told(
     drawn: AnswerPosterior,
     both: BothParts,
-    settings: Thresholds,
+    false_alarms: float,
     prior: PriorUse | None,
     seed: int,
     each: Each,
@@ -47,7 +46,7 @@ def told(
     Args:
         drawn: the answer of the fitting part and its posterior.
         both: its verdict and evidence in both parts.
-        settings: thresholds.
+        false_alarms: probability of an addition on a healthy machine, as asked for.
         prior: what was known before; None for nothing.
         seed: seed of what the alarm simulates.
         each: simulates several records at a time if it can.
@@ -71,7 +70,7 @@ def told(
         error=both.error,
         candidates=findings.candidates(result.beam, found, result.seen),
         coverage=both.coverage,
-        alarm=alarm_of(result, settings.false_alarms, seed, each),
+        alarm=alarm_of(result, false_alarms, seed, each),
         advice=(
             *([prior.contradiction()] if prior and prior.contradicted else []),
             *advice.at_bound(pressed, sizes),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from actuator_glue.diagnosis.score.scorer import pooled, splits_of
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import least_material
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.json_value import JsonObject
@@ -29,10 +29,10 @@ class FirstLook(JsonObject):
     matters_m: float
 
     @classmethod
-    def of(cls, data: Data, fit: Fit, settings: Thresholds) -> FirstLook:
+    def of(cls, data: Data, fit: Fit) -> FirstLook:
         """Split the residual of a fit of Eq. (2) into noise and structure."""
         structure, noise = pooled(data, splits_of(data, fit.error))
-        matters = settings.material(noise, scale(data.records, fit.theta).stroke)
+        matters = least_material(noise, scale(data.records, fit.theta).stroke)
         return cls(fit.rms, noise, structure, matters)
 
     @property

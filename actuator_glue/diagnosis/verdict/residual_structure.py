@@ -17,7 +17,7 @@ from actuator_glue.diagnosis.scopes import hold_and_stiffness
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, splits_of
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.thresholds import NATS, NOISE_SHARE, least_material
 from actuator_glue.inference.effective_size import effective_size
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import Data
@@ -146,7 +146,6 @@ def residual_structure(
         structure: the model.
         theta: its parameters near the best fit, SI units, (p,).
     """
-    settings = Thresholds()
     data = _data(records, initial, settle)
     if min(int(mask.sum()) for mask in data.masks) < _FEWEST:
         return None
@@ -154,19 +153,19 @@ def residual_structure(
     hold = records[0].hold
     others = data.with_setup(hold=_OTHER[hold])
     other = _refitted(others, structure, found.theta)
-    noise = float(np.sqrt(np.mean(_noise(data, structure, found, settings))))
+    noise = float(np.sqrt(np.mean(_noise(data, structure, found))))
     # The noise is one sensor's: with a misfit, more passes for noise.
     if other.rms < found.rms:
-        noise = min(noise, float(np.sqrt(np.mean(_noise(others, structure, other, settings)))))
+        noise = min(noise, float(np.sqrt(np.mean(_noise(others, structure, other)))))
     nearer, near = (others, other) if other.rms < found.rms else (data, found)
     scorer = Scorer.of(nearer, splits_of(nearer, near.error))
     left = float(np.sqrt(max(found.rms**2 - noise**2, 0.0)))
     stroke = scale(data.records, found.theta).stroke
     short = sum(part.stop - part.start for part in data.parts) * min(data.periods) < _SHORT
-    matters = settings.material(2.0 * noise if short else noise, stroke)
+    matters = least_material(2.0 * noise if short else noise, stroke)
     setup = None
     if left >= matters:
-        setup = hold_and_stiffness.find(data, settings)
+        setup = hold_and_stiffness.find(data)
     return ResidualStructure(
         structure_m=left,
         noise_m=noise,
@@ -177,7 +176,7 @@ def residual_structure(
         other_hold=_OTHER[hold],
         other_rms_m=other.rms,
         nats=evidence(scorer.block_scores(other), scorer.block_scores(found)),
-        nats_needed=settings.nats,
+        nats_needed=NATS,
         setup=setup,
         means_s=max(
             (r.period for r, n in zip(data.records, data.factors, strict=True) if n > 1),
@@ -203,7 +202,7 @@ def _refitted(data: Data, structure: Structure, theta: Array) -> Fit:
     return near if near.rms < anywhere.rms else anywhere
 
 
-def _noise(data: Data, structure: Structure, found: Fit, settings: Thresholds) -> Array:
+def _noise(data: Data, structure: Structure, found: Fit) -> Array:
     """Return the noise's mean square of each counted sample's record, (N,) [m^2].
 
     A white residual is noise. For any other that seems to be noise, a forecast of stretches that
@@ -215,19 +214,17 @@ def _noise(data: Data, structure: Structure, found: Fit, settings: Thresholds) -
     worth = effective_size(
         [found.error[p] for p in data.parts], [found.jacobian[:, p] for p in data.parts]
     )
-    if worth < _WHITE * found.error.size and not _plain(found, noise, sizes, settings):
+    if worth < _WHITE * found.error.size and not _plain(found, noise, sizes):
         scorer = Scorer.of(data, splits)
-        most = forecast.noise(
-            forecast.Features(data, found.theta[:4]), scorer, found, settings.nats
-        )
+        most = forecast.noise(forecast.Features(data, found.theta[:4]), scorer, found, NATS)
         noise = np.minimum(noise, most)
     return np.repeat(noise**2, sizes)
 
 
-def _plain(found: Fit, noise: Array, sizes: Sequence[int], settings: Thresholds) -> bool:
+def _plain(found: Fit, noise: Array, sizes: Sequence[int]) -> bool:
     """Whether the spectrogram alone shows that more than noise is left."""
     mean = float(np.average(noise**2, weights=sizes))
-    return rms(found.error) ** 2 - mean >= (2.0 * settings.noise_share) ** 2 * mean
+    return rms(found.error) ** 2 - mean >= (2.0 * NOISE_SHARE) ** 2 * mean
 
 
 def _command_rms(data: Data) -> float:

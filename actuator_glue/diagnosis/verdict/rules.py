@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from actuator_glue.diagnosis.finding import Finding
-from actuator_glue.diagnosis.thresholds import FAR_FROM_NOISE, LIKELY, SOME_REMOVED, Thresholds
+from actuator_glue.diagnosis.thresholds import FAR_FROM_NOISE, LATER_SHARE, LIKELY, SOME_REMOVED
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdicts import Verdict
-
-_LATER = Thresholds().later_share  # of what was removed: less is negligible
 
 
 def far(error: HeldOutError, material: float, left: float | None = None) -> bool:
@@ -36,7 +34,7 @@ def misses(error: HeldOutError, material: float, left: float | None = None) -> b
     if far(error, material, left):
         return True
     removed = max(0.0, error.before**2 - error.after**2)
-    matters = left**2 - floor**2 > max(material**2, _LATER**2 * removed)
+    matters = left**2 - floor**2 > max(material**2, LATER_SHARE**2 * removed)
     return matters and error.after_ci[0] * left > floor * error.after
 
 
