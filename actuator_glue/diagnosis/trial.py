@@ -44,3 +44,8 @@ class Trial:
     def mean_square(self) -> float:
         """Mean squared free-run error [m^2]."""
         return float(np.mean(self.fit.error**2))
+
+
+def removed(before: Trial, after: Trial) -> float:
+    """Rms error that a larger structure removes [m]."""
+    return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +19,13 @@ from actuator_glue.diagnosis.selection import SearchStep
 WEIGHTS = {'light': -1, 'a': 1, 'b': 2, 'c': 1, 'd': 1}
 
 
+@cache
+def chosen(effects: tuple[str, ...]) -> Any:
+    """A structure with a parameter for each effect beside four."""
+    fit = SimpleNamespace(theta=np.zeros(4 + len(effects)), rms=1e-5)
+    return SimpleNamespace(final=SimpleNamespace(effects=effects, fit=fit))
+
+
 @dataclass(frozen=True)
 class Answer:
     """Stands for a conclusion: effects found, and what each parameter leaves."""
@@ -29,19 +37,13 @@ class Answer:
     beam: Any = field(default_factory=lambda: SimpleNamespace(refits='one for all'))
 
     @property
-    def found(self) -> tuple[str, ...]:
+    def found(self) -> Any:
         """What was chosen: the same object for the same answer."""
-        return self.effects
+        return chosen(self.effects)
 
     def outweighs(self, other: Answer) -> bool:
         """Whether it has more weight."""
         return sum(map(WEIGHTS.get, self.effects)) > sum(map(WEIGHTS.get, other.effects))
-
-    @property
-    def decision(self) -> Any:
-        """A structure with a parameter for each effect beside four."""
-        fit = SimpleNamespace(theta=np.zeros(4 + len(self.effects)), rms=1e-5)
-        return SimpleNamespace(final=SimpleNamespace(effects=self.effects, fit=fit))
 
 
 def adding(name: str, *, when: bool = True, taken: bool = True) -> Any:

@@ -5,9 +5,9 @@ import two_sweeps
 
 from actuator_glue.diagnosis.moves import two_effects
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
-from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import LEFT_NOISE
+from actuator_glue.diagnosis.trial import removed
 
 NAMES = ('delay', 'supply-droop', 'viscous-damping', 'gain-drift', 'bias')
 DELAY, DROOP = 8e-3, 6.0  # together some 8 um, each alone less than 3

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.sizes import DIMENSIONS, LEARNED, unit_text
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.json_value import Json
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.model.structure import Structure

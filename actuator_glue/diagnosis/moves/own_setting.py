@@ -18,11 +18,10 @@ from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.conclusion import Conclusion
-from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.search.table import Row, row
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.trial import Trial, removed
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -66,7 +65,7 @@ def _with_setting(
     """
     found, refits = result.found, beam.refits
     data, scorer = refits.data, refits.scorer
-    if len(data.records) < 2 or scorer is None:
+    if len(data.records) < 2:
         return (), None
     start, held = refits.trial(effects), result.prepared.held.records
     tried = [
@@ -88,7 +87,7 @@ def _with_setting(
 
 def _row(refits: Refits, trial: Trial, rest: Structure, tried: int) -> Row:
     """Return the row of a structure with one record's own setting, one of `tried`."""
-    assert refits.scorer is not None and isinstance(trial.model, OneRecord)
+    assert isinstance(trial.model, OneRecord)
     more = len(trial.model.parameters) - len(rest.parameters)
     cost = refits.price(rest) + more + float(np.log(tried))
     return row(trial.model, trial.effects, trial.fit, refits.scorer, cost, trial.model.scope)
@@ -105,12 +104,10 @@ def _fitted(
     model = OneRecord(structure, name, (record,), (*refits.data.records, *held))
     thetas = refits.promises.screen(start, name)[1]
     found = fit(refits.data, model, thetas)
-    assert refits.scorer is not None
     return Trial(structure, name, found, refits.scorer.block_scores(found), model)
 
 
 def _rescored(refits: Refits, trial: Trial) -> Trial:
-    assert refits.scorer is not None
     return replace(trial, scores=refits.scorer.block_scores(trial.fit))
 
 
@@ -123,7 +120,6 @@ def _attribution(
 ) -> Selection:
     """Return the selection with the best setting and its rivals."""
     refits, best = beam.refits, tried[0]
-    assert refits.scorer is not None
     nearest = {t.added: t for t in reversed(tried)}  # the record that each fits best
     others = [t for name, t in nearest.items() if name != best.added]
     odds = beam.odds(start, best, others)

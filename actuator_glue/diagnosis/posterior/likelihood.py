@@ -16,8 +16,7 @@ import scipy
 
 from actuator_glue.diagnosis.posterior.discrepancy import Discrepancy, ScaleMixture
 from actuator_glue.diagnosis.posterior.identifiable import Straight, Working, derivatives
-from actuator_glue.diagnosis.score.scorer import Scorer
-from actuator_glue.diagnosis.search.gains import standard_error
+from actuator_glue.diagnosis.score.scorer import Scorer, standard_error
 from actuator_glue.inference.least_squares.data import Data, lanes
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit

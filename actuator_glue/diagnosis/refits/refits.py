@@ -18,10 +18,10 @@ from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits import global_search, poles
 from actuator_glue.diagnosis.refits.candidates import FEEDBACK, structure_of
 from actuator_glue.diagnosis.refits.promises import Promises
-from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
+from actuator_glue.diagnosis.score.scorer import Scorer, evidence, splits_of, structure_and_noise
 from actuator_glue.diagnosis.score.weights import price
 from actuator_glue.diagnosis.thresholds import FAR, UNDERSTATED
-from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.trial import Trial, removed
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit, rms
@@ -87,7 +87,6 @@ class Refits:
 
     Attributes:
         data: the counted samples.
-        scorer: noise and blocks; set once the base is fitted.
         entries: all effects, in the order in which they stand in a structure: those of the
             catalogue, and learned terms for these data.
         names: effects that act on the mean response.
@@ -100,10 +99,10 @@ class Refits:
     data: Data
     names: tuple[str, ...]
     each: Each = map
-    scorer: Scorer | None = None
     entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
     described: bool = False
     effort: Effort = field(default_factory=Effort)
+    _scorer: Scorer | None = None
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
     _promises: Promises | None = None
@@ -115,6 +114,16 @@ class Refits:
         if frozenset() not in self._tried:
             self._tried[frozenset()] = self.effort.spent_on(base_fit(self.data))
         return self._tried[frozenset()]
+
+    @property
+    def scorer(self) -> Scorer:
+        """Noise and blocks, once they were taken from a structure's residual."""
+        assert self._scorer is not None
+        return self._scorer
+
+    @scorer.setter
+    def scorer(self, scorer: Scorer) -> None:
+        self._scorer = scorer
 
     @property
     def promises(self) -> Promises:
@@ -138,7 +147,6 @@ class Refits:
 
     def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
         """Score an already refitted structure with the current noise."""
-        assert self.scorer is not None
         found = self._tried[frozenset(effects)]
         return Trial(self.structure(*effects), added, found, self.scorer.block_scores(found))
 
@@ -377,7 +385,15 @@ class Refits:
 
     def _structure(self, fit: Fit) -> float:
         """Return the share of a fit's squared error that is no noise."""
-        return (pooled(self.data, splits_of(self.data, fit.error))[0] / fit.rms) ** 2
+        return (structure_and_noise(self.data, fit.error)[0] / fit.rms) ** 2
+
+    def worth(self, final: Trial) -> tuple[dict[str, float], dict[str, float]]:
+        """Return, by effect, rms error [m] removed and nats gained beside the other effects."""
+        gains, nats = {}, {}
+        for name in final.effects:
+            rest = self.without(final, name)
+            gains[name], nats[name] = removed(rest, final), evidence(final.scores, rest.scores)
+        return gains, nats
 
     def without_each(self, current: Trial) -> list[Trial]:
         """Refit a structure with each of its effects taken away, in their order, as `without`."""

@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 import scipy.optimize
 
-from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.thresholds import TELLING
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
+from actuator_glue.json_value import Json
 from actuator_glue.model.parameters import NAMES
 
 STIFFNESS: Final = 'stiffness'

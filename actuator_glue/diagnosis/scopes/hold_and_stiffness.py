@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from actuator_glue.diagnosis.score import forecast
-from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.score.scorer import Scorer, evidence, splits_of, structure_and_noise
 from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.thresholds import MATTERING, NATS, SETUP_FAR, least_material
 from actuator_glue.inference.least_squares.data import Data
@@ -149,7 +149,7 @@ def find(data: Data, given: Fit | None = None) -> WrongSetup | None:
     some = stretched(data)
     given = given or base_fit(some)
     stroke = scale(some.records, given.theta).stroke
-    left, noise = pooled(some, splits_of(some, given.error))
+    left, noise = structure_and_noise(some, given.error)
     # Under a stationary command structure passes for noise: there, little of it says nothing.
     if left < least_material(noise, stroke) and not any(forecast.stationary(some)):
         return None
@@ -159,7 +159,7 @@ def find(data: Data, given: Fit | None = None) -> WrongSetup | None:
     best = min(range(len(ways)), key=lambda i: ways[i][1].rms)
     ahead = some, _ahead(some, given)
     part, found = min(ways[best], ahead, key=lambda way: way[1].rms)
-    noise = pooled(part, splits_of(part, found.error))[1]
+    noise = structure_and_noise(part, found.error)[1]
     material = least_material(noise, stroke)
     # A lead of half a sample is the other hold: what it is beyond that must matter.
     leads = _weight(ahead[1], material) > _weight(ways[best][1], material)
@@ -172,7 +172,7 @@ def find(data: Data, given: Fit | None = None) -> WrongSetup | None:
         data,
         data if leads else others[best],
         (given.rms, found.rms),
-        pooled(part, splits_of(part, found.error))[0] < material,
+        structure_and_noise(part, found.error)[0] < material,
         lead=float(found.theta[-1]) if leads else 0.0,
     )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.score.scorer import pooled, splits_of
+from actuator_glue.diagnosis.score.scorer import structure_and_noise
 from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.thresholds import LEFT_NOISE, MATTERING
 from actuator_glue.diagnosis.trial import Trial
@@ -150,7 +150,7 @@ def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
 
 def quiet(before: Data, error: Array) -> bool:
     """Whether what a fit leaves of the data before a moment is noise."""
-    left, noise = pooled(before, splits_of(before, error))
+    left, noise = structure_and_noise(before, error)
     return left <= LEFT_NOISE * noise
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.signal
 
-from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.scopes.change import Change
 from actuator_glue.diagnosis.scopes.moments import Moment
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data, Mask
+from actuator_glue.json_value import Json
 from actuator_glue.model.linear import systems
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record, source_names

@@ -181,10 +181,25 @@ def evidence(scores: Array, reference: Array) -> float:
     return float(difference.sum() - max(0.0, difference.max()))
 
 
+def standard_error(difference: Array) -> float:
+    """Return the standard error of the sum of block differences (B,) [nats].
+
+    It says how far they are chance.
+    """
+    # Squares may overflow for a structure that diverges without a block.
+    size = float(np.abs(difference).max()) or 1.0
+    return float(np.sqrt(len(difference)) * (difference / size).std(ddof=1)) * size
+
+
 def splits_of(data: Data, error: Array) -> list[Split]:
     """Split the joined residual of every record."""
     parts = data.split(error)
     return [split(e, period) for e, period in zip(parts, data.periods, strict=True)]
+
+
+def structure_and_noise(data: Data, error: Array) -> tuple[float, float]:
+    """Return what a joined residual (N,) holds: structure and noise of all records, rms [m]."""
+    return pooled(data, splits_of(data, error))
 
 
 def pooled(data: Data, splits: list[Split]) -> tuple[float, float]:

@@ -13,8 +13,7 @@ from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.refits.refits import Asked, Refits, by_score
 from actuator_glue.diagnosis.score import false_alarms
-from actuator_glue.diagnosis.search import gains, pairs
-from actuator_glue.diagnosis.search.gains import removed, worth
+from actuator_glue.diagnosis.search import pairs
 from actuator_glue.diagnosis.search.judge import Judge
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import SearchStep, Selection
@@ -31,9 +30,10 @@ from actuator_glue.diagnosis.thresholds import (
     SEEN,
     TERMS,
     TRIED,
+    WORTH_FINISHING,
     Thresholds,
 )
-from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.trial import Trial, removed
 
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
@@ -162,10 +162,8 @@ class BeamSearch(Judge):
         return self._grown(current, self.rescored(found.singles), (), ())
 
     def _set_nats(self) -> None:
-        scorer = self.refits.scorer
-        assert scorer is not None
         seen, jacobian, part = self.refits.promises.signatures(self.refits.names)
-        noise = scorer.of_part(part)
+        noise = self.refits.scorer.of_part(part)
         self.nats = false_alarms.threshold(seen, jacobian, noise, self.settings.false_alarms)
 
     def _grown(
@@ -260,9 +258,7 @@ class BeamSearch(Judge):
         Nats weigh the few frequencies with little noise: by them a structure that explains nearly
         everything may be last.
         """
-        scorer = self.refits.scorer
-        assert scorer is not None
-        return min(trials, key=lambda t: scorer.left_out_error(t.fit))
+        return min(trials, key=lambda t: self.refits.scorer.left_out_error(t.fit))
 
     def checked(
         self, current: Trial, singles: Sequence[Trial], *, exchanged: bool = True
@@ -284,7 +280,7 @@ class BeamSearch(Judge):
             current, rivals = self.settle(self.refits.finished(current, finely=rest))
         else:
             rivals = self._known_rivals(current)
-        taken, nats = worth(self.refits, current)
+        taken, nats = self.refits.worth(current)
         return Selection(
             self.refits.trial(()), tuple(self.rescored(singles)), current, rivals, taken, nats,
             self.first, self.left(current), self.noise, self.material, self.nats,
@@ -353,7 +349,9 @@ class BeamSearch(Judge):
             names = refits.others(current)
             if len(current.effects) > 1:
                 names = refits.promises.best(rest, names)[:most]
-            below = gains.left_by_rivals(rest, current)
+            # A rough refit of a rival that leaves more is not worth finishing.
+            taken = rest.mean_square - current.mean_square
+            below = rest.mean_square - WORTH_FINISHING**2 * taken
             asked.append(Asked(rest, tuple(names), below))
         singles = refits.additions_to(asked)
         return [
@@ -366,7 +364,6 @@ class BeamSearch(Judge):
     ) -> tuple[Rival, ...]:
         """Return the rivals with their probabilities; remaining misfit counts as noise."""
         odds, scorer = self.odds(rest, best, trials), self.refits.scorer
-        assert scorer is not None
         if self.left(best) >= self.material:
             scorer = self.refits.with_misfit(best)
             rest, best, *trials = (

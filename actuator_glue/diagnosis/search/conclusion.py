@@ -64,9 +64,7 @@ class Conclusion:
     @property
     def scorer(self) -> Scorer:
         """Noise and blocks of the final structure."""
-        scorer = self.beam.refits.scorer
-        assert scorer is not None
-        return scorer
+        return self.beam.refits.scorer
 
     @property
     def scope(self) -> str:
@@ -159,7 +157,6 @@ def concluded(
         line: hum that was removed from the data before.
     """
     refits = beam.refits
-    assert refits.scorer is not None
     seen = at_recorded_rate.find(refits.data, found, line)
     chosen = found.final if found.final.effects else found.singles[0]
     generic = regression.compare(refits.data, refits.scorer, found.base, chosen)

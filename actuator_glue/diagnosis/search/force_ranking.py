@@ -18,7 +18,6 @@ from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import log_weight
-from actuator_glue.diagnosis.search.gains import worth
 from actuator_glue.diagnosis.search.ties import compare
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import NOISE_SHARE, TELLING
@@ -110,7 +109,7 @@ def _swapped(refits: Refits, found: Selection, name: str, ranked: Ranked) -> Sel
     told = [replace(r, probability=share * r.probability) for r in ranked.rivals]
     rivals = {n: row for n, row in found.rivals.items() if n != name}
     rivals[best.added] = (*told, *others)
-    gains, nats = worth(refits, final)
+    gains, nats = refits.worth(final)
     return replace(found, final=final, rivals=rivals, removed=gains, evidence=nats)
 
 

@@ -14,7 +14,6 @@ from actuator_glue.diagnosis.score import forecast
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.score.weights import counted, log_weight
 from actuator_glue.diagnosis.search import table
-from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.thresholds import (
     NATS,
     ROUGHLY,
@@ -23,7 +22,7 @@ from actuator_glue.diagnosis.thresholds import (
     TOGETHER,
     least_material,
 )
-from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.trial import Trial, removed
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.records import Array
 
@@ -69,7 +68,7 @@ class Judge:
             return self._known[1]
         data, scorer = self.refits.data, self.refits.scorer
         splits = splits_of(data, fit.error)
-        if any(self._stationary) and scorer is not None:
+        if any(self._stationary):
             most = forecast.noise(self._features, scorer, fit, NATS)
             splits = [
                 replace(s, noise=min(s.noise, limit)) if asked else s
@@ -116,17 +115,15 @@ class Judge:
         return self._log_weight(other, tells) - self._log_weight(trial, tells)
 
     def _log_weight(self, trial: Trial, tells: float) -> float:
-        scorer = self.refits.scorer
-        assert scorer is not None
-        left_out = counted(scorer.left_out_error(trial.fit), trial.effects, self.material)
+        left_out = self.refits.scorer.left_out_error(trial.fit)
+        left_out = counted(left_out, trial.effects, self.material)
         return log_weight(left_out, tells, self.refits.price(trial.structure))
 
     def heaviest(self, trials: Sequence[Trial]) -> Trial:
         """Return the structure of the greatest weight."""
-        scorer = self.refits.scorer
-        assert scorer is not None
+        refits = self.refits
         rows = [
-            table.row(t.structure, t.effects, t.fit, scorer, self.refits.price(t.structure))
+            table.row(t.structure, t.effects, t.fit, refits.scorer, refits.price(t.structure))
             for t in trials
         ]
         nearest = min(trials, key=lambda t: t.fit.rms)

@@ -16,11 +16,10 @@ import numpy as np
 
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.refits.refits import Refits
-from actuator_glue.diagnosis.score.scorer import Scorer, evidence, inflation
-from actuator_glue.diagnosis.search.gains import removed, standard_error
+from actuator_glue.diagnosis.score.scorer import Scorer, evidence, inflation, standard_error
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import TIE_NATS, TIED
-from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.trial import Trial, removed
 from actuator_glue.model.effects import CATALOGUE
 
 _NORMAL_95 = 1.959964

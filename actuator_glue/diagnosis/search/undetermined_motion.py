@@ -17,7 +17,7 @@ import scipy
 from actuator_glue.diagnosis.refits import global_search
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.samples.preparation import Prepared
-from actuator_glue.diagnosis.score.scorer import Scorer, pooled, splits_of
+from actuator_glue.diagnosis.score.scorer import Scorer, splits_of, structure_and_noise
 from actuator_glue.diagnosis.thresholds import least_material
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.hygiene.checks import where
@@ -84,7 +84,7 @@ def without(prepared: Prepared, refits: Refits, fixed: bool) -> tuple[Prepared, 
         refits.scorer = Scorer.of(refits.data, splits_of(refits.data, refits.base().error))
         base = refits.trial(())
         simple = refits.polish(refits.add(base, rich.holds[0], refits.each))
-        left, noise = pooled(refits.data, splits_of(refits.data, simple.fit.error))
+        left, noise = structure_and_noise(refits.data, simple.fit.error)
         size = least_material(noise, refits.scale().stroke)
         if simple.mean_square > _SIMPLE * base.mean_square or left < size:
             continue

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.effort import Effort
-from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.posterior.posterior import RHAT
@@ -21,6 +21,7 @@ from actuator_glue.diagnosis.verdict.rules import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.convergence import APART
 from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.json_value import Json
 from actuator_glue.model.effects import CATALOGUE
 
 

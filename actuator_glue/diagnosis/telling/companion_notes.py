@@ -6,9 +6,8 @@ from collections import Counter
 
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.companions import beyond, with_companions
-from actuator_glue.diagnosis.search.gains import removed
 from actuator_glue.diagnosis.thresholds import SEEN
-from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.trial import Trial, removed
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.model.effects import CATALOGUE

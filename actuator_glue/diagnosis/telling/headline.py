@@ -26,52 +26,42 @@ class Told(Protocol):
     @property
     def verdict(self) -> Verdict:
         """The verdict."""
-        ...
 
     @property
     def effects(self) -> Sequence[Finding]:
         """Additions that are supported."""
-        ...
 
     @property
     def learned(self) -> Sequence[LearnedTerm]:
         """Learned terms among these."""
-        ...
 
     @property
     def error(self) -> HeldOutError:
         """Held-out error before and after."""
-        ...
 
     @property
     def alarm(self) -> Alarm:
         """Why Eq. (2) is not enough, or is."""
-        ...
 
     @property
     def remaining(self) -> Json:
         """Where the unexplained residual lies."""
-        ...
 
     @property
     def traces(self) -> Sequence[Trace]:
         """Curves of each record, fitted or held out."""
-        ...
 
     @property
     def onset(self) -> Onset | None:
         """When the effects appeared; None if they were there from the beginning."""
-        ...
 
     @property
     def setup(self) -> WrongSetup | None:
         """Another set-up that explains the records far better; None for none."""
-        ...
 
     @property
     def doubts(self) -> Sequence[str]:
         """Why the answer must not be used as it stands."""
-        ...
 
 
 def record_names(traces: Sequence[Trace], others: Iterable[str] = ()) -> dict[str, str]:

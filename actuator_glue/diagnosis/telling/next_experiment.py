@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.space import Space, jacobian
+from actuator_glue.json_value import Json
 from actuator_glue.model import commands
 from actuator_glue.model.effects import Scale
 from actuator_glue.records import Array, Record

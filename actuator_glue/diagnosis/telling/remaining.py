@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.score.scorer import splits_of
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.json_value import Json
 from actuator_glue.records import Array
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.posterior.mixed_draws import shares
@@ -25,7 +25,7 @@ from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.diagnosis.verdicts import COMPLETE, Verdict
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.prior_use import PriorUse
-from actuator_glue.json_value import json_value
+from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array

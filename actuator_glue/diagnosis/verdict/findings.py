@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.score import reliability
-from actuator_glue.diagnosis.search.gains import standard_error
+from actuator_glue.diagnosis.score.scorer import standard_error
 from actuator_glue.diagnosis.search.judge import Judge
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from actuator_glue.diagnosis.score.scorer import pooled, splits_of
+from actuator_glue.diagnosis.score.scorer import structure_and_noise
 from actuator_glue.diagnosis.thresholds import least_material
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit
@@ -31,7 +31,7 @@ class FirstLook(JsonObject):
     @classmethod
     def of(cls, data: Data, fit: Fit) -> FirstLook:
         """Split the residual of a fit of Eq. (2) into noise and structure."""
-        structure, noise = pooled(data, splits_of(data, fit.error))
+        structure, noise = structure_and_noise(data, fit.error)
         matters = least_material(noise, scale(data.records, fit.theta).stroke)
         return cls(fit.rms, noise, structure, matters)
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from actuator_glue.diagnosis.estimate import Json
-from actuator_glue.json_value import json_fields, json_value
+from actuator_glue.json_value import Json, json_fields, json_value
 
 
 @dataclass(frozen=True, slots=True)
