@@ -56,14 +56,4 @@ def in_the_loop(beam: BeamSearch, found: Selection) -> Selection | None:
     if not worth:
         return None
     best = max(worth, key=lambda t: float(t.scores.sum()) - len(t.fit.theta))
-    while len(best.effects) < beam.settings.most:
-        beam.renoise(best)
-        best = refits.trial(best.effects, best.added)
-        if beam.left(best) < beam.material:
-            break
-        further = beam.extend([best], len(best.effects))
-        worth = [t for t in further if beam.better(t, best, beam.material)]
-        if not worth:
-            break
-        best = worth[0]
-    return beam.checked(best, found.singles)
+    return beam.grown_from(best, found)

@@ -25,7 +25,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.learned.forms import descriptions
 from actuator_glue.diagnosis.learned.term import is_learned
-from actuator_glue.diagnosis.thresholds import MATTERING, REPLACING, TELLING
+from actuator_glue.diagnosis.thresholds import MATTERING, REPLACING
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -59,7 +59,7 @@ def log_weights(
     costs: Sequence[float],
     additions: Sequence[int],
     material: float,
-    telling: float = TELLING,
+    telling: float,
 ) -> Array:
     """Return the logarithms of the weights of all structures of a table (K,), the greatest 0.
 

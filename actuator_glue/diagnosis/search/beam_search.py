@@ -157,7 +157,11 @@ class BeamSearch(Judge):
         common = before.trial(tuple(n for n in found.final.effects if n != own))
         self.renoise()
         self.refits.take_over(before, common, found.singles, found.material)
-        current = self._at_its_optimum(self.refits.trial(common.effects))
+        return self.grown_from(self.refits.trial(common.effects), found)
+
+    def grown_from(self, current: Trial, found: Selection) -> Selection:
+        """Continue from a structure that another result led to."""
+        current = self._at_its_optimum(current)
         self._set_nats()
         return self._grown(current, self.rescored(found.singles), (), ())
 

@@ -26,7 +26,7 @@ def rivals(
     trials: Sequence[Trial],
     most: int,
     below: float,
-    complete: bool = True,
+    complete: bool,
 ) -> list[Trial]:
     """Refit the most promising pairs that have no more parameters than an effect.
 

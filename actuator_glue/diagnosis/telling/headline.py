@@ -64,7 +64,7 @@ class Told(Protocol):
         """Why the answer must not be used as it stands."""
 
 
-def record_names(traces: Sequence[Trace], others: Iterable[str] = ()) -> dict[str, str]:
+def record_names(traces: Sequence[Trace], others: Iterable[str]) -> dict[str, str]:
     """Return what people read as the names of records, from their curves and other sources.
 
     A diagnosis has one set of them, for its sentences, tables and pictures: a record that is held

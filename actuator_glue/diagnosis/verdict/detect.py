@@ -148,7 +148,7 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
     return out
 
 
-def alarm_of(result: Conclusion, level: float, seed: int, each: Each = map) -> Alarm:
+def alarm_of(result: Conclusion, level: float, seed: int, each: Each) -> Alarm:
     """Describe the alarm behind the answer of the fitting part.
 
     Args:

@@ -152,8 +152,8 @@ def verify(
     after: Side,
     noise: float,
     seed: int,
-    line: Line | None = None,
-    tried: int = 1,
+    line: Line | None,
+    tried: int,
 ) -> tuple[HeldOutError, tuple[float, float], tuple[BandCurves, BandCurves]]:
     """Compare both structures on data that decided nothing.
 
