@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis.moves.that_matter import that_matter
+from actuator_glue.diagnosis.moves.taken_for_noise import taken_for_noise
 from actuator_glue.diagnosis.posterior import answer_posterior, discrepancy, mixed_draws, posterior
 from actuator_glue.diagnosis.posterior.posterior import Draws
 from actuator_glue.diagnosis.search import companions
@@ -112,9 +112,9 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
 def test_what_removes_what_matters_is_added() -> None:
     """Though the rest passed for noise: where 1 um mattered the gap's 1.7 um would."""
     beam, found = selected(GAP)
-    assert that_matter(beam, found) is None
+    assert taken_for_noise(beam, found) is None
     beam.material = 1e-6
-    larger = that_matter(beam, found)
+    larger = taken_for_noise(beam, found)
     assert larger is not None
     assert larger.final.effects == ('viscous-damping', 'specimen-gap')
     assert set(larger.rivals) == set(larger.final.effects)

@@ -9,7 +9,7 @@ import pytest
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.verdict.detect import ljung_box
+from actuator_glue.diagnosis.verdict.alarm import ljung_box
 from actuator_glue.inference.least_squares import decimate
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure

@@ -7,7 +7,7 @@ import pytest
 from two_sweeps import RATE, THETA, sweep
 
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
-from actuator_glue.diagnosis.verdict.detect import statistics
+from actuator_glue.diagnosis.verdict.alarm import statistics
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

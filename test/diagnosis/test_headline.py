@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.scopes.onset import Onset
 from actuator_glue.diagnosis.telling.advice import contradicted, zeros
 from actuator_glue.diagnosis.telling.headline import headline
 from actuator_glue.diagnosis.telling.result import DiagnosisData
-from actuator_glue.diagnosis.verdict.detect import Alarm
+from actuator_glue.diagnosis.verdict.alarm import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.rules import (
     against,

@@ -18,7 +18,6 @@ from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis import pipeline
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import LearnedTerm
-from actuator_glue.diagnosis.moves import reserved
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE, Scale
@@ -64,7 +63,7 @@ def found() -> Diagnosis:
     records = machine(0, 1.0, 2e-4, PLANTS[1], 1, 128.0, 12.0)
     names = tuple(n for n in pipeline.mean_effects() if n != 'sensor-curve')
     with pytest.MonkeyPatch.context() as patch:
-        for place in (pipeline, reserved):
+        for place in (pipeline, reserved_effects):
             patch.setattr(place, 'mean_effects', lambda reserved=False: () if reserved else names)
         plain = core.diagnose(records[:2], records[2], settings=replace(QUICK, most=1))
     return Diagnosis(**{f.name: getattr(plain, f.name) for f in fields(plain)})

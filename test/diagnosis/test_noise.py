@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.verdict.detect import p_value
+from actuator_glue.diagnosis.verdict.alarm import p_value
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.noise import split, structured, whiten, whitener
 from actuator_glue.records import Record

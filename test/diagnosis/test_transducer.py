@@ -6,7 +6,7 @@ from scipy.interpolate import CubicSpline
 from smooth_machines import piston
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.moves.feedback import in_the_loop
+from actuator_glue.diagnosis.moves.transducer_in_loop import in_the_loop
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection

@@ -81,7 +81,7 @@ def _with_setting(
     if left > result.decision.limit:
         return rows, None
     refits.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
-    tried, start = [_rescored(refits, t) for t in tried], refits.trial(effects)
+    tried, start = [t.scored(refits.scorer) for t in tried], refits.trial(effects)
     return rows, _attribution(beam, found, start, tried, (left, noise))
 
 
@@ -105,10 +105,6 @@ def _fitted(
     thetas = refits.promises.screen(start, name)[1]
     found = fit(refits.data, model, thetas)
     return Trial(structure, name, found, refits.scorer.block_scores(found), model)
-
-
-def _rescored(refits: Refits, trial: Trial) -> Trial:
-    return replace(trial, scores=refits.scorer.block_scores(trial.fit))
 
 
 def _attribution(

@@ -9,17 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from actuator_glue.diagnosis.moves import (
-    feedback,
-    learned_terms,
-    other_hold,
-    own_setting,
-    reserved,
-    since_onset,
-    that_matter,
-    two_effects,
-    two_for_one,
-)
+from actuator_glue.diagnosis.moves.learned_terms import with_terms
 from actuator_glue.diagnosis.moves.move import (
     AnswerMove,
     Groups,
@@ -30,26 +20,34 @@ from actuator_glue.diagnosis.moves.move import (
     to,
     unexplained,
 )
+from actuator_glue.diagnosis.moves.other_hold import other_hold
+from actuator_glue.diagnosis.moves.own_setting import own_setting
+from actuator_glue.diagnosis.moves.reserved_effects import with_reserved
+from actuator_glue.diagnosis.moves.since_onset import since_onset
+from actuator_glue.diagnosis.moves.taken_for_noise import taken_for_noise
+from actuator_glue.diagnosis.moves.transducer_in_loop import in_the_loop
+from actuator_glue.diagnosis.moves.two_effects import explained
+from actuator_glue.diagnosis.moves.two_for_one import exchanged
 
 # Moves under one hold and one onset. A description may imitate names and settings; a search of
 # its own comes last, as none is begun once the effort is spent.
 WITHIN: Final[Groups] = (
     (
-        AnswerMove('learned terms', described, to(learned_terms.with_terms)),
-        AnswerMove("one record's own setting", described, own_setting.own_setting),
-        AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),
+        AnswerMove('learned terms', described, to(with_terms)),
+        AnswerMove("one record's own setting", described, own_setting),
+        AnswerMove('effects reserved for the rest', unexplained, with_reserved),
     ),
-    (AnswerMove("the transducer's fault inside the loop", always, to(feedback.in_the_loop)),),
-    (AnswerMove('learned terms', complete, to(learned_terms.with_terms), each_time=False),),
-    (AnswerMove("one record's own setting", unexplained, own_setting.own_setting),),
+    (AnswerMove("the transducer's fault inside the loop", always, to(in_the_loop)),),
+    (AnswerMove('learned terms', complete, to(with_terms), each_time=False),),
+    (AnswerMove("one record's own setting", unexplained, own_setting),),
 )
 # Moves across holds and onsets. A change during the test can look like another hold.
 ACROSS: Final[Groups] = (
     (
-        AnswerMove('the other hold of the command', as_given, other_hold.other_hold),
-        AnswerMove('the data since something appeared', always, since_onset.since_onset),
+        AnswerMove('the other hold of the command', as_given, other_hold),
+        AnswerMove('the data since something appeared', always, since_onset),
     ),
-    (AnswerMove('two effects at once', unexplained, to(two_effects.explained)),),
-    (AnswerMove('effects that matter after all', complete, to(that_matter.that_matter)),),
-    (AnswerMove('two effects for one', complete, to(two_for_one.exchanged)),),
+    (AnswerMove('two effects at once', unexplained, to(explained)),),
+    (AnswerMove('effects that matter after all', complete, to(taken_for_noise)),),
+    (AnswerMove('two effects for one', complete, to(exchanged)),),
 )

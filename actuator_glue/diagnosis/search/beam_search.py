@@ -63,8 +63,8 @@ class BeamSearch(Judge):
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
         """Refit every structure of the beam with its most promising further effects.
 
-        Beyond `_NAMES` of them with learned terms, too: for what is outside the catalogue, further
-        names would only imitate it.
+        Beyond `NAMES_FIRST` of them with learned terms, too: for what is outside the catalogue,
+        further names would only imitate it.
         """
         label = EFFECTS[min(stage, len(EFFECTS)) - 1]
         self.progress(label, 0.0)
@@ -370,7 +370,5 @@ class BeamSearch(Judge):
         odds, scorer = self.odds(rest, best, trials), self.refits.scorer
         if self.left(best) >= self.material:
             scorer = self.refits.with_misfit(best)
-            rest, best, *trials = (
-                replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
-            )
+            rest, best, *trials = (t.scored(scorer) for t in (rest, best, *trials))
         return compare(rest, replace(best, added=name), trials, odds, scorer)

@@ -11,7 +11,7 @@ from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.scopes.hold_and_stiffness import WrongSetup
 from actuator_glue.diagnosis.scopes.onset import Onset
 from actuator_glue.diagnosis.thresholds import LIKELY
-from actuator_glue.diagnosis.verdict.detect import Alarm
+from actuator_glue.diagnosis.verdict.alarm import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.rules import excuse, likely, misses
 from actuator_glue.diagnosis.verdict.traces import Trace

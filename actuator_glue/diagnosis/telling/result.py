@@ -19,7 +19,7 @@ from actuator_glue.diagnosis.selection import SearchStep
 from actuator_glue.diagnosis.telling.headline import headline
 from actuator_glue.diagnosis.telling.next_experiment import Experiment
 from actuator_glue.diagnosis.telling.response import Response
-from actuator_glue.diagnosis.verdict.detect import Alarm
+from actuator_glue.diagnosis.verdict.alarm import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
 from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.diagnosis.verdicts import COMPLETE, Verdict

@@ -18,8 +18,8 @@ from actuator_glue.diagnosis.telling.response import Response
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verdict import findings
+from actuator_glue.diagnosis.verdict.alarm import alarm_of
 from actuator_glue.diagnosis.verdict.both_parts import BothParts
-from actuator_glue.diagnosis.verdict.detect import alarm_of
 from actuator_glue.diagnosis.verdict.traces import traces
 from actuator_glue.diagnosis.verdicts import COMPLETE
 from actuator_glue.hygiene import rest

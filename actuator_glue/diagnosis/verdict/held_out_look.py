@@ -168,38 +168,27 @@ def verify(
     """
     rng = np.random.default_rng([seed, 3])
     noise = float(np.hypot(noise, line.rms)) if line else noise
-    errors, halves, sims, inner = {}, {}, {}, {}
-    for key, side in (('before', before), ('after', after)):
-        sims[key] = held.simulate(side.model, side.theta)[0]
-        inner[key] = fit.simulate(side.model, side.theta)[0]
-        errors[key] = held.target - sims[key]
-    floor = noise_floor(fit, held, (fit.target - inner['after'], errors['after']), noise)
-    curves = {}
-    for key, side in (('before', before), ('after', after)):
-        deviation, reached = spread(
-            held, side.model, sims[key], side.draws, rng, reach=side is after
-        )
-        halves[key] = _NORMAL_95 * np.sqrt(deviation**2 + floor**2)
-        deviation = spread(fit, side.model, inner[key], side.draws, rng)[0]
-        width = _NORMAL_95 * np.sqrt(deviation**2 + noise**2)
-        curves[key] = BandCurves(inner[key], width, sims[key], halves[key])
-    intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
-    first, last = rms(errors['before']), rms(errors['after'])
+    sides = before, after
+    fitted = [fit.simulate(side.model, side.theta)[0] for side in sides]
+    simulated = [held.simulate(side.model, side.theta)[0] for side in sides]
+    inner, (was, now) = [fit.target - y for y in fitted], [held.target - y for y in simulated]
+    floor = noise_floor(fit, held, (inner[1], now), noise)
+    curves, reached = [], None
+    for side, here, there in zip(sides, fitted, simulated, strict=True):
+        deviation, reached = spread(held, side.model, there, side.draws, rng, reach=side is after)
+        wide = _NORMAL_95 * np.sqrt(deviation**2 + floor**2)
+        deviation = spread(fit, side.model, here, side.draws, rng)[0]
+        curves.append(BandCurves(here, _NORMAL_95 * np.sqrt(deviation**2 + noise**2), there, wide))
+    intervals = bootstrap((was, now), floor, held, rng)
+    first, last = rms(was), rms(now)
     removable = first**2 - floor**2
     count = len(after.theta) - len(before.theta)
-    pair = fit.target - inner['before'], errors['before']
-    sham = _sham(fit, held, before, pair, (count, tried), seed)
-    without_zero = record_zero.without(held, errors['after'])
+    sham = _sham(fit, held, before, (inner[0], was), (count, tried), seed)
+    without_zero = record_zero.without(held, now)
+    rows = zip(held.records, held.split(was), held.split(now), strict=True)
     per_record = tuple(
         (record.source or f'record {i + 1}', rms(b), rms(a))
-        for i, (record, b, a) in enumerate(
-            zip(
-                held.records,
-                held.split(errors['before']),
-                held.split(errors['after']),
-                strict=True,
-            )
-        )
+        for i, (record, b, a) in enumerate(rows)
     )
     error = HeldOutError(
         before=first,
@@ -210,13 +199,13 @@ def verify(
         removable_removed=(first**2 - last**2) / removable if removable > 0 else 0.0,
         removed_ci=intervals[2],
         sham=sham,
-        after_without_hum=rms(hum.regressed(held, errors['after'], line)) if line else None,
+        after_without_hum=rms(hum.regressed(held, now, line)) if line else None,
         records=per_record,
         after_without_zero=rms(without_zero),
         zeros=tuple(map(rms, held.split(without_zero))),
         reached=reached,
     )
-    coverage = tuple(
-        float(np.mean(np.abs(errors[key]) <= halves[key])) for key in ('before', 'after')
-    )
-    return error, (coverage[0], coverage[1]), (curves['before'], curves['after'])
+    covered = [
+        float(np.mean(np.abs(e) <= c.held_width)) for e, c in zip((was, now), curves, strict=True)
+    ]
+    return error, (covered[0], covered[1]), (curves[0], curves[1])

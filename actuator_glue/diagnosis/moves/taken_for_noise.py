@@ -11,7 +11,7 @@ from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 
 
-def that_matter(beam: BeamSearch, found: Selection) -> Selection | None:
+def taken_for_noise(beam: BeamSearch, found: Selection) -> Selection | None:
     """Return a selection with further effects that turn out to matter, or None.
 
     Args:
