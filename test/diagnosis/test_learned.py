@@ -18,6 +18,7 @@ from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis import pipeline
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import LearnedTerm
+from actuator_glue.diagnosis.moves import reserved_effects
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE, Scale
