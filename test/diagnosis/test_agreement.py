@@ -7,8 +7,8 @@ import pytest
 
 from actuator_glue.diagnosis.posterior.agreement import agreement, between
 from actuator_glue.diagnosis.refits.refits import Refits
-from actuator_glue.diagnosis.score.regression import Surrogate, compare
 from actuator_glue.diagnosis.score.scorer import Scorer, splits_of
+from actuator_glue.diagnosis.score.surrogate import Surrogate, compare
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure

@@ -21,7 +21,7 @@ import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.score.regression import library
+from actuator_glue.diagnosis.score.motion_features import library
 from actuator_glue.diagnosis.score.scorer import Scorer, evidence, splits_of
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.decimate import motion_bandwidth

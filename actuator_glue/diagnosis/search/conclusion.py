@@ -15,9 +15,9 @@ from actuator_glue.diagnosis.samples.preparation import Prepared
 from actuator_glue.diagnosis.scopes import change
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.scopes.onset import Appeared, Onset, dated
-from actuator_glue.diagnosis.score import regression
-from actuator_glue.diagnosis.score.regression import Surrogate
+from actuator_glue.diagnosis.score import surrogate
 from actuator_glue.diagnosis.score.scorer import Scorer
+from actuator_glue.diagnosis.score.surrogate import Surrogate
 from actuator_glue.diagnosis.search import force_ranking, table
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
 from actuator_glue.diagnosis.search.fitting_verdict import Decision, decide
@@ -159,7 +159,7 @@ def concluded(
     refits = beam.refits
     seen = at_recorded_rate.find(refits.data, found, line)
     chosen = found.final if found.final.effects else found.singles[0]
-    generic = regression.compare(refits.data, refits.scorer, found.base, chosen)
+    generic = surrogate.compare(refits.data, refits.scorer, found.base, chosen)
     decision = decide(found, seen, generic)
     return Conclusion(prepared, line, found, seen, generic, decision, beam, found.steps)
 

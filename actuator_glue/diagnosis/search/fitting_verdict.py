@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.learned.term import any_learned, is_learned
 from actuator_glue.diagnosis.measured.measurement import Measured
-from actuator_glue.diagnosis.score.regression import Surrogate
+from actuator_glue.diagnosis.score.surrogate import Surrogate
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import (
     BEATEN_NOISE,

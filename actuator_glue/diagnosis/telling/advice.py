@@ -11,7 +11,7 @@ from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.posterior.agreement import Homogeneity
 from actuator_glue.diagnosis.posterior.posterior import RHAT
-from actuator_glue.diagnosis.score.regression import Surrogate
+from actuator_glue.diagnosis.score.surrogate import Surrogate
 from actuator_glue.diagnosis.search.fitting_verdict import Decision
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.telling.next_experiment import Experiment
