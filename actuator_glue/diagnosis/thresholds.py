@@ -46,17 +46,17 @@ def least_material(noise: float, stroke: float) -> float:
     return max(NOISE_SHARE * noise, STROKE_SHARE * stroke)
 
 
-# Where most is explained, a further effect must remove this share of what was.
+# Of the error removed so far: where most is explained, a further effect must remove so much.
 LATER_SHARE: Final = 0.08
 # Smallest out-of-sample evidence for another set-up or a generic surrogate.
 NATS: Final = 10.0
 
 # Unexplained means that material structure is left above this share of the noise and above this
-# share of the structure found at first;
+# share of the structure found at first.
 LEFT_NOISE: Final = 0.6
 LEFT_SHARE: Final = 0.3
-# the same where a generic surrogate explains more than the names do (0.28 of the noise is found in
-# noise alone).
+# The same two where a generic surrogate explains more than the names do: 0.28 of the noise is found
+# in noise alone.
 BEATEN_NOISE: Final = 0.3
 BEATEN_SHARE: Final = 0.15
 
