@@ -55,8 +55,8 @@ NATS: Final = 10.0
 # share of the structure found at first.
 LEFT_NOISE: Final = 0.6
 LEFT_SHARE: Final = 0.3
-# The same two where a generic surrogate explains more than the names do: 0.28 of the noise is found
-# in noise alone.
+# The same two where a generic surrogate explains more than the names do: 0.28 of the noise is
+# found in noise alone.
 BEATEN_NOISE: Final = 0.3
 BEATEN_SHARE: Final = 0.15
 
