@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.score.scorer import Scorer
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.structure import Structure
@@ -40,10 +39,6 @@ class Trial:
     def model(self) -> Model:
         """The model that simulates it."""
         return self.own or self.structure
-
-    def scored(self, scorer: Scorer) -> Trial:
-        """Return it with the block scores under another noise."""
-        return replace(self, scores=scorer.block_scores(self.fit))
 
     @property
     def mean_square(self) -> float:

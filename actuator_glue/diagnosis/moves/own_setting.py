@@ -81,7 +81,7 @@ def _with_setting(
     if left > result.decision.limit:
         return rows, None
     refits.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
-    tried, start = [t.scored(refits.scorer) for t in tried], refits.trial(effects)
+    tried, start = [refits.scorer.scored(t) for t in tried], refits.trial(effects)
     return rows, _attribution(beam, found, start, tried, (left, noise))
 
 

@@ -123,6 +123,7 @@ class Refits:
 
     @scorer.setter
     def scorer(self, scorer: Scorer) -> None:
+        """Take another noise."""
         self._scorer = scorer
 
     @property

@@ -10,12 +10,13 @@ these are the optimum and the covariance of the sampled one (posterior/likelihoo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.stretches import Part
@@ -85,6 +86,10 @@ class Scorer:
         if fit not in self._known:
             self._known[fit] = self._block_scores(fit)
         return self._known[fit]
+
+    def scored(self, trial: Trial) -> Trial:
+        """Return a structure with the block scores under this noise."""
+        return replace(trial, scores=self.block_scores(trial.fit))
 
     def _block_scores(self, fit: Fit) -> Array:
         error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)

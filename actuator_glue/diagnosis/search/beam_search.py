@@ -370,5 +370,5 @@ class BeamSearch(Judge):
         odds, scorer = self.odds(rest, best, trials), self.refits.scorer
         if self.left(best) >= self.material:
             scorer = self.refits.with_misfit(best)
-            rest, best, *trials = (t.scored(scorer) for t in (rest, best, *trials))
+            rest, best, *trials = (scorer.scored(t) for t in (rest, best, *trials))
         return compare(rest, replace(best, added=name), trials, odds, scorer)

@@ -79,7 +79,7 @@ def _ranked(refits: Refits, rest: Trial, contenders: Sequence[Trial]) -> Ranked:
         left_out = scorer.left_out_error(trial.fit)
         return log_weight(left_out, TELLING * material, len(trial.fit.theta))
 
-    alone, *trials = (t.scored(scorer) for t in tried)
+    alone, *trials = (scorer.scored(t) for t in tried)
     trials.sort(key=weight, reverse=True)
     first = weight(trials[0])
     odds = [math.exp(min(weight(t) - first, 0.0)) for t in (*trials[1:], alone)]
