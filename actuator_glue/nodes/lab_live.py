@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -54,6 +55,8 @@ _JUDGED = 3.0  # seconds of samples that are not zero
 _MANY, _FEW = 0.5, 50
 # Silence of this length is reported [s].
 SILENT = 1.0
+# Time that messages may take to become samples: those wait for any that may come before them [s].
+PREPARED = 0.5
 # Longest pause between two looks at the socket [s].
 LOOK = 0.02
 
@@ -127,16 +130,19 @@ class LiveSource:
         self._announce()
         # Before it is said that the stream begins: a program that waits for that sends at once.
         self._node.introduce(self._drain)
-        last = time.monotonic()
+        last, unused_since = time.monotonic(), math.inf
         while True:
             batches = self._listener.receive(0.1)
             now = time.monotonic()
             found = [s for rows in batches for s in self._reception.push(rows, now)]
             found += self._reception.waited(now, self._node.get_clock().now().nanoseconds)
             if found:
-                last, self._heard = now, self._messages()
-            elif now - last > SILENT:
-                last = now  # to be told once a second
+                last, self._heard, unused_since = now, self._messages(), math.inf
+            elif self._messages() != self._heard:
+                unused_since = min(unused_since, now)
+            fresh = now - PREPARED < unused_since < math.inf
+            if now - last > SILENT and not fresh:
+                last, unused_since = now, math.inf  # to be told once a second
                 self._tell_silence()
             self._tell()
             yield Step(0.0, partial(self._publish, found))

@@ -21,7 +21,7 @@ from actuator_glue.io.bag_records import write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import linear
 from actuator_glue.model.commands import noise
-from actuator_glue.nodes import topics
+from actuator_glue.nodes import lab_live, topics
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.health import Rate
 from actuator_glue.nodes.lab_live import LiveSource
@@ -181,8 +181,8 @@ def test_what_is_sent_as_soon_as_the_stream_begins_is_in_it():
     assert np.concatenate([m.measured for m in found]).tolist() == [7.0, 8.0, 9.0]
 
 
-def told(tmp_path, layout, messages, scheme='udp'):
-    """What LiveSource complains of, by kind, while it hears these messages of a layout."""
+def listening(tmp_path, layout, scheme='udp'):
+    """A LiveSource, what it complains of by kind, and the port that it listens to."""
     kind = socket.SOCK_DGRAM if scheme == 'udp' else socket.SOCK_STREAM
     port, said = free_port(kind), defaultdict(str)
     path = tmp_path / 'layout.yaml'
@@ -198,7 +198,13 @@ def told(tmp_path, layout, messages, scheme='udp'):
     node = SimpleNamespace(
         get_clock=lambda: clock, introduce=lambda _: None, samples=Rate(), complain=complain
     )
-    source = LiveSource(node, values, BlockPublisher(lambda topic: Sink(topic, [])))
+    return LiveSource(node, values, BlockPublisher(lambda topic: Sink(topic, []))), said, port
+
+
+def told(tmp_path, layout, messages, scheme='udp'):
+    """What LiveSource complains of, by kind, while it hears these messages of a layout."""
+    source, said, port = listening(tmp_path, layout, scheme)
+    kind = socket.SOCK_DGRAM if scheme == 'udp' else socket.SOCK_STREAM
     waiting, end = list(messages), time.monotonic() + 60.0
     with closing(source), closing(socket.socket(type=kind)) as out:
         out.connect(('127.0.0.1', port))
@@ -265,6 +271,23 @@ def test_messages_of_which_none_can_be_used_are_no_silence(tmp_path):
     swapped = [struct.pack('>Idd', i, x, x) for i, x in enumerate(MOTION, 1)]
     said = told(tmp_path, {'rate': 200, 'sample': COUNTED}, swapped)
     assert 'check the layout' in said['no sample'] and 'far off' in said['implausible']
+
+
+def test_the_first_samples_after_a_silence_are_no_fault(tmp_path, monkeypatch):
+    """They wait for those that may come before them, and a second may end meanwhile."""
+    now = [0.0]
+    clock = SimpleNamespace(monotonic=lambda: now[0], sleep=lambda _: None)
+    monkeypatch.setattr(lab_live, 'time', clock)
+    source, said, port = listening(tmp_path, {'rate': 200, 'sample': COUNTED})
+    with closing(source), closing(socket.socket(type=socket.SOCK_DGRAM)) as out:
+        out.connect(('127.0.0.1', port))
+        steps = source.steps()
+        next(steps).act()
+        for i, at in enumerate((1.01, 1.02, 1.2)):
+            now[0] = at
+            out.send(struct.pack('<Idd', i, 1.0, 1.0))
+            next(steps).act()
+        assert source._node.samples.count and not said
 
 
 def test_a_connection_that_says_nothing_is_silent(tmp_path):
