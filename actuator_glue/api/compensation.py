@@ -14,6 +14,7 @@ from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.partition_given import partition_given
 from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
+from actuator_glue.api.shown import Shown
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.hybrid.compensator import KINDS
 from actuator_glue.hybrid.ground_motion import GroundMotion
@@ -26,7 +27,7 @@ HEADER = ('compensator', 'P(unstable)', 'upper 95 %', 'J1 [ms]', 'J2 median', 'J
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Shown):
     """The same hybrid test with every compensator.
 
     Attributes:
@@ -34,6 +35,8 @@ class Comparison:
         best: the one to use: smallest upper bound of P(unstable), then smallest 95th percentile
             of J2.
     """
+
+    more = '`to_json()` has them'
 
     found: dict[str, StabilityResult]
     best: str
@@ -63,18 +66,6 @@ class Comparison:
             html.Text(self.summary()),
             html.Table(HEADER, self.rows(), 'Compensators'),
         ]
-
-    def __repr__(self) -> str:
-        """Return it in a few lines."""
-        from actuator_glue.report.as_text import as_text
-
-        return as_text(self.brief(), '`to_json()` has them')
-
-    def _repr_html_(self) -> str:
-        """Return it for notebooks."""
-        from actuator_glue.report import html
-
-        return html.fragment(self.brief())
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each compensator, under HEADER."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from actuator_glue.api import store
+from actuator_glue.api.shown import Shown
 from actuator_glue.given import path as given_path
 from actuator_glue.motion import METRES, speaking, spoken
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from actuator_glue.report import html
 
 
-class Result(ABC):
+class Result(Shown):
     """A result: a dataclass that says what it holds in a few blocks, a figure and a page.
 
     Attributes:
@@ -44,10 +45,6 @@ class Result(ABC):
     @abstractmethod
     def plot(self) -> Figure:
         """Return the figure that shows it best."""
-
-    @abstractmethod
-    def brief(self) -> list[html.Block]:
-        """Return what came out, and what limits it, in text and tables."""
 
     @abstractmethod
     def page(self) -> html.Page:
@@ -82,15 +79,10 @@ class Result(ABC):
             return html.write(given_path(path), self.page())
 
     def __repr__(self) -> str:
-        """Return what came out in a few lines, without arrays."""
-        from actuator_glue.report.as_text import as_text
-
-        told = as_text(self.brief(), '`to_json()` has them, `report(path)` shows them')
-        return spoken(told, self.motion)
+        """Return what came out in a few lines, in the unit of its motion."""
+        return spoken(super().__repr__(), self.motion)
 
     def _repr_html_(self) -> str:
-        """Return what came out, for notebooks."""
-        from actuator_glue.report import html
-
+        """Return what came out for notebooks, in the unit of its motion."""
         with speaking(self.motion):
-            return html.fragment(self.brief())
+            return super()._repr_html_()

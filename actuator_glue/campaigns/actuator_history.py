@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.given import seed_given
+from actuator_glue.api.shown import Shown
 from actuator_glue.campaigns.change_points import change_points
 from actuator_glue.campaigns.day_left_out import left_out
 from actuator_glue.campaigns.effect_spells import effect_histories
@@ -24,11 +25,13 @@ from actuator_glue.given import path as path_given
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from actuator_glue.report import html
+
 _MOST = 100.0  # logarithm: farther off is no number to be told
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ActuatorHistory(HistoryData):
+class ActuatorHistory(Shown, HistoryData):
     """What the tests of one actuator tell together, and its page."""
 
     def report(self, path: Path | str) -> Path:
@@ -43,19 +46,11 @@ class ActuatorHistory(HistoryData):
         path = path_given(path)
         return html.write(path, page(self, path.resolve().parent))
 
-    def __repr__(self) -> str:
-        """Return it in a few lines."""
+    def brief(self) -> list[html.Block]:
+        """Return the history in a sentence, changes, effects, the next test."""
         from actuator_glue.campaigns.history_page import brief
-        from actuator_glue.report.as_text import as_text
 
-        return as_text(brief(self), '`to_json()` has them, `report(path)` shows them')
-
-    def _repr_html_(self) -> str:
-        """Return it for notebooks."""
-        from actuator_glue.campaigns.history_page import brief
-        from actuator_glue.report import html
-
-        return html.fragment(brief(self))
+        return brief(self)
 
 
 def history(

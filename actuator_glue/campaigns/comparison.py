@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import norm
 
+from actuator_glue.api.shown import Shown
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
 from actuator_glue.campaigns.day_model import walked
 from actuator_glue.campaigns.rows import read_results
@@ -52,7 +53,7 @@ class ParameterDifference:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class DaysCompared:
+class DaysCompared(Shown):
     """Two sides of one actuator.
 
     Attributes:
@@ -63,6 +64,8 @@ class DaysCompared:
         notes: what the history says of the sides: its changes between them or within one, and
             their days that are out of line.
     """
+
+    more = 'the attributes hold them'
 
     actuator: str
     a: tuple[str, ...]
@@ -79,18 +82,6 @@ class DaysCompared:
         sides = f'B: {_told(self.b)}; A: {_told(self.a)}'
         table = html.Table(HEADER, rows, sides)
         return [html.Text(self.summary()), table, *map(html.Note, self.notes)]
-
-    def __repr__(self) -> str:
-        """Return it in a few lines."""
-        from actuator_glue.report.as_text import as_text
-
-        return as_text(self.brief(), 'the attributes hold them')
-
-    def _repr_html_(self) -> str:
-        """Return it for notebooks."""
-        from actuator_glue.report import html
-
-        return html.fragment(self.brief())
 
     def summary(self) -> str:
         """Return the answer in one line."""

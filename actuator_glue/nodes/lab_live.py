@@ -56,7 +56,7 @@ _MANY, _FEW = 0.5, 50
 # Silence of this length is reported [s].
 SILENT = 1.0
 # Time that messages may take to become samples: those wait for any that may come before them [s].
-PREPARED = 0.5
+_PREPARED = 0.5
 # Longest pause between two looks at the socket [s].
 LOOK = 0.02
 
@@ -140,7 +140,7 @@ class LiveSource:
                 last, self._heard, unused_since = now, self._messages(), math.inf
             elif self._messages() != self._heard:
                 unused_since = min(unused_since, now)
-            fresh = now - PREPARED < unused_since < math.inf
+            fresh = now - _PREPARED < unused_since < math.inf
             if now - last > SILENT and not fresh:
                 last, unused_since = now, math.inf  # to be told once a second
                 self._tell_silence()
