@@ -80,6 +80,14 @@ def numbers(values: ArrayLike) -> Array:
     return np.array(held, dtype=np.float64)
 
 
+def _vector(values: ArrayLike) -> ArrayLike:
+    """Return a column or a row, (n, 1) or (1, n) as MATLAB's files hold them, as (n,)."""
+    shape = getattr(values, 'shape', ())
+    if len(shape) != 2 or 1 not in shape:
+        return values
+    return values.ravel() if isinstance(values, np.ma.MaskedArray) else np.asarray(values).ravel()
+
+
 def _column(
     values: ArrayLike, name: str, unit: str, limit: float, source: str, motion: str = METRES
 ) -> Array:
@@ -358,8 +366,8 @@ class Record:
         """Return the record of a test whose channels are arrays, columns of a table or lists.
 
         Args:
-            time: when each sample was taken, shape (n,): seconds, datetimes of numpy or pandas, or
-                times of day.
+            time: when each sample was taken, shape (n,), as those of all channels may be (n, 1) or
+                (1, n): seconds, datetimes of numpy or pandas, or times of day.
             command: commanded displacement, shape (n,) [unit].
             measured: measured displacement, shape (n,) [unit].
             force: measured actuator force, shape (n,) [force_unit]; None where there is none.
@@ -380,10 +388,11 @@ class Record:
         motion, length = _of_unit(unit, moves, 'unit')
         forces = FORCE | TORQUES if motion == MOTIONS['deg'][0] else FORCE
         newton = _of_unit(force_unit, forces, 'force_unit')
+        time = _vector(time)
         period, start_ns = _clock(time, '')
-        channels = {'command': command, 'measured': measured}
+        channels = {'command': _vector(command), 'measured': _vector(measured)}
         if force is not None:
-            channels['force'] = force
+            channels['force'] = _vector(force)
         columns = {}
         for name, values in channels.items():
             try:

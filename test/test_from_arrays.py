@@ -74,6 +74,22 @@ def test_columns_of_a_table_and_lists_are_arrays() -> None:
         assert one.period == made.period == 1 / 200
 
 
+@pytest.mark.parametrize('shape', [(-1, 1), (1, -1)])
+def test_columns_and_rows_of_matlab_are_arrays(shape: tuple[int, int]) -> None:
+    """`scipy.io.loadmat` gives nothing else."""
+    given = [v.reshape(shape) for v in (TIME, U, X, F)]
+    masked = np.ma.array(X, mask=False).reshape(shape)
+    made = ag.Record.from_arrays(*given, unit='mm')
+    usual = ag.Record.from_arrays(TIME, U, X, F, unit='mm')
+    for one in (made, ag.Record.from_arrays(TIME, given[1], masked, unit='mm')):
+        np.testing.assert_array_equal(one.measured, usual.measured)
+        assert one.period == usual.period
+    table = pd.DataFrame({'u': U})
+    np.testing.assert_array_equal(
+        ag.Record.from_arrays(TIME, table, X, unit='mm').command, usual.command
+    )
+
+
 @pytest.mark.parametrize(
     ('change', 'told'),
     [
@@ -88,7 +104,9 @@ def test_columns_of_a_table_and_lists_are_arrays() -> None:
         ({'time': np.delete(np.arange(60), range(20, 30)) / 200.0}, 'without samples'),
         ({'time': TIME[:-1]}, 'command has 50 samples, time has 49'),
         ({'measured': X[:-1]}, 'measured has 49 samples, time has 50'),
-        ({'time': TIME[:, None]}, 'one-dimensional'),
+        ({'time': np.tile(TIME, (2, 1))}, 'one-dimensional'),
+        ({'command': np.tile(U, (2, 1))}, 'one-dimensional'),
+        ({'command': [[1.0], [2.0, 3.0]]}, 'command is not a list of numbers'),
         ({'time': ['a'] * 50}, 'no list of seconds'),
         ({'time': 0.005}, 'one-dimensional'),
         ({'time': np.full(50, np.datetime64('NaT', 'ns'))}, 'no date at sample 0'),

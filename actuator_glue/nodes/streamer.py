@@ -96,7 +96,8 @@ class Streamer(base.SuiteNode):
         missing = ''
         if there < wanted:
             missing = (
-                f'{wanted} subscribers of samples, {there} {"is" if there == 1 else "are"} there'
+                f'{wanted} subscribers of samples, {there} {"is" if there == 1 else "are"} there; '
+                'a node subscribes once its code is compiled, minutes after a first start'
             )
         elif self.stamps_now and self.get_clock().now().nanoseconds == 0:
             # Simulated time is 0 until the first /clock: such stamps would jump with it.
