@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable
 
 from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.telling.headline import left_open
 from actuator_glue.diagnosis.telling.result import DiagnosisData
-from actuator_glue.diagnosis.verdict.rules import Excuse, excuse, likely
+from actuator_glue.diagnosis.verdict.rules import likely
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.diagnosis_figures import residual_summary
 from actuator_glue.report.first_page import FirstPage, command
@@ -75,23 +76,17 @@ def _names(found: DiagnosisData) -> list[Block]:
     return [Table(header, rows, 'What is missing, and how sure its name is.', prose=True)]
 
 
-def _left_open(found: DiagnosisData) -> Excuse | None:
-    """Return what would explain held-out records of which the fitting ones leave too much open."""
-    if found.verdict != 'undecided' or found.structure:
-        return None
-    return excuse(found.error, found.alarm.threshold)
-
-
 def _meaning(found: DiagnosisData) -> str:
     """Return what the verdict means, in a sentence."""
     if found.doubts:
         return 'In doubt, for what is told first; the rest is what the records say by themselves.'
     if found.verdict == 'missing-effect' and all(e.noise is not None for e in found.effects):
         return 'The model is enough for what moves; what is named below is in what measures it.'
-    open_ = _left_open(found)
+    open_ = left_open(found)
     if open_ is not None:
+        known = 'Named, but not known' if found.structure else 'Not decided'
         return (
-            f'Not decided: of held-out records nothing but noise is left {open_.how}, and the '
+            f'{known}: of held-out records nothing but noise is left {open_.how}, and the '
             'fitting records leave that open.'
         )
     return _MEANS[found.verdict]
@@ -103,7 +98,7 @@ def certainty(found: DiagnosisData) -> str:
     named = [e for e in found.effects if math.isfinite(e.probability)]
     if found.doubts:
         return f'{inside}, and the answer is in doubt'
-    if _left_open(found) is not None:
+    if left_open(found) is not None:
         return f'{inside}; the fitting records leave open where in it'
     if not found.complete:
         return f'{inside}, and the answer is not complete: intervals are too narrow'
@@ -200,8 +195,10 @@ def next_command(found: DiagnosisData) -> str:
     if found.setup is not None and not found.setup.taken:
         tests = list(zip(found.setup.sources, found.setup.stiffness, strict=True))
         return command('diagnose', tests, *found.setup.options(), held=held)
+    if held and left_open(found) is not None:
+        return command('diagnose', [*fitted, *held])
     if found.verdict == 'undecided' and held:
-        return command('diagnose', held if _left_open(found) is None else [*fitted, *held])
+        return command('diagnose', held)
     if found.learned:
         return command('diagnose', fitted, '--save-effects', 'learned.yaml', held=held)
     if not found.complete:

@@ -13,6 +13,7 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.api.doubt import doubts
 from actuator_glue.cli.main import main
+from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.io.export import write
 from actuator_glue.model.structure import Structure
 from actuator_glue.report.quantity import said_in
@@ -178,6 +179,14 @@ def test_what_one_stiffness_leaves_open_is_no_contradiction() -> None:
     told = ' '.join((*page.verdict, page.certainty))
     assert 'the fitting records leave that open' in told and 'leave open where in it' in told
     assert 'contradict' not in told and 'too narrow' not in told
+    assert page.command.split()[1:3] == ['diagnose', 'a.csv'] and 'c.csv' in page.command
+    # The same with a name that the fitting records are sure of: nothing else is missing.
+    effect = Finding('delay', (), 1.0, 'command', {}, 1e-5, 1e-5, 50.0)
+    named = replace(found, verdict='unexplained', effects=(effect,), structure=('delay',))
+    page = named.first_page()
+    told = ' '.join((*page.verdict, page.certainty))
+    assert told.startswith('added, and left open by the fitting records: delay;')
+    assert 'Named, but not known' in told and 'remains beside' not in told
     assert page.command.split()[1:3] == ['diagnose', 'a.csv'] and 'c.csv' in page.command
     # Where no parameters explain all records, that is a contradiction.
     apart = replace(found, error=replace(found.error, reached=found.error.after))

@@ -67,7 +67,7 @@ def diagnosis(
         NONE,
         (),
         {},
-        {'left': 12e-6},
+        {'left': 12e-6, 'limit': 5e-6},
         1.0,
     )
 
@@ -308,6 +308,9 @@ def test_what_likely_parameters_leave_bears_additions_out(
             'open), noise 10.0 um; 12.0 um of structure in the fitting records remain'
         )
         explained = replace(told, remaining={**told.remaining, 'left': 4e-8})
+        assert explained.summary().startswith(
+            f'added, and left open by the fitting records: backlash; held-out error {start}'
+        )
         assert explained.summary().endswith('leave them open), noise 10.0 um')
 
 

@@ -283,7 +283,7 @@ class BeamSearch(Judge):
             rest = self.left(current) >= BEATEN_NOISE * self.noise
             current, rivals = self.settle(self.refits.finished(current, finely=rest))
         else:
-            rivals = self._known_rivals(current)
+            current, rivals = self._settled_among_known(current)
         taken, nats = self.refits.worth(current)
         return Selection(
             self.refits.trial(()), tuple(self.rescored(singles)), current, rivals, taken, nats,
@@ -309,22 +309,32 @@ class BeamSearch(Judge):
         for _ in range(_SWAPS if complete else _OPEN):
             rests = self.refits.without_each(current)
             in_place = self._in_place(current, rests, most, complete)
-            best = current
-            for trial in itertools.chain(*in_place):
-                if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
-                    best = trial
+            best = self._heaviest_of(current, in_place)
             if best is current:
                 return current, self._all_rivals(current, rests, in_place)
             # With the new member, others may no longer be worth their parameters.
             current = self.pruned(best)
             if self.refits.effort.over:
                 break
-        return current, self._known_rivals(current)
+        return self._settled_among_known(current)
 
-    def _known_rivals(self, current: Trial) -> dict[str, tuple[Rival, ...]]:
-        rests = self.refits.without_each(current)
-        known = [self._known_in_place(current, rest) for rest in rests]
-        return self._all_rivals(current, rests, known)
+    def _settled_among_known(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
+        """As `settle`, with the structures that are refitted already."""
+        while True:
+            rests = self.refits.without_each(current)
+            known = [self._known_in_place(current, rest) for rest in rests]
+            best = self._heaviest_of(current, known)
+            if best is current:
+                return current, self._all_rivals(current, rests, known)
+            current = best
+
+    def _heaviest_of(self, current: Trial, in_place: Sequence[Sequence[Trial]]) -> Trial:
+        """Return the structure of most weight, of one and those with another member."""
+        best = current
+        for trial in itertools.chain(*in_place):
+            if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
+                best = trial
+        return best
 
     def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
         """Return the known refits with another effect in place of a member."""

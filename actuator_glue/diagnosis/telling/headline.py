@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.scopes.onset import Onset
 from actuator_glue.diagnosis.thresholds import LIKELY
 from actuator_glue.diagnosis.verdict.alarm import Alarm
 from actuator_glue.diagnosis.verdict.held_out import HeldOutError
-from actuator_glue.diagnosis.verdict.rules import excuse, likely, misses
+from actuator_glue.diagnosis.verdict.rules import Excuse, excuse, likely, misses
 from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.diagnosis.verdicts import Verdict
 from actuator_glue.json_value import Json
@@ -134,6 +134,22 @@ def _errors(found: Told, named: bool) -> str:
     return f'{change(other.before, other.after)} {other.how} ({best} {other.otherwise})'
 
 
+def left_open(found: Told) -> Excuse | None:
+    """Return what explains held-out records of which the fitting ones leave too much open.
+
+    None where an answer is incomplete for another reason: the fitting records themselves show more
+    than it holds, or ask for what the held-out ones do not, or a name is improbable.
+    """
+    if found.verdict == 'undecided':
+        open_ = all(e.noise is not None for e in found.effects)
+    elif found.verdict == 'unexplained':
+        explained = found.remaining['left'] <= found.remaining['limit']
+        open_ = explained and all(map(likely, found.effects))
+    else:
+        open_ = False
+    return excuse(found.error, found.alarm.threshold) if open_ else None
+
+
 def headline(found: Told) -> str:
     """Return the verdict in one line, never more than the held-out part confirms.
 
@@ -168,5 +184,7 @@ def _verdict(found: Told) -> str:
             change += f'; {left} um of structure in the fitting records remain'
         if not names:
             return f'the model is not enough and no addition is supported: {change}'
+        if left_open(found) is not None:
+            return f'added, and left open by the fitting records: {names}; {change}'
         return f'added, but not the whole story: {names}; {change}'
     return f'missing: {names}; {change}' if names else f'{enough}: {change}'
