@@ -153,3 +153,20 @@ def test_the_nearest_structure_gives_the_noise() -> None:
     refits = found.refits
     trials = [refits.add(refits.trial(()), name) for name in ('bias', 'gain', 'drift')]
     assert found._nearest(trials).added == 'gain'
+
+
+def test_a_member_gives_way_to_what_has_more_weight_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of known structures the heaviest is told; a pair that is pruned to less is no exchange."""
+    found = beam(stationary(('gain',), [1.05], 41))
+    refits = found.refits
+    bias, lag, gain = (refits.add(refits.trial(()), n) for n in ('bias', 'sensor-lag', 'gain'))
+    found.renoise(gain)
+    bias, lag, gain = (refits.trial(t.effects, t.added) for t in (bias, lag, gain))
+    assert found.behind(gain, lag) < 0.0 < found.behind(bias, lag)
+    assert found._exchanged(lag, [[bias, gain]]).effects == ('gain',)
+    told, rivals = found._settled_among_known(lag)
+    assert told.effects == ('gain',) and rivals['gain'][0].name == 'gain'
+    monkeypatch.setattr(found, 'pruned', lambda _: bias)
+    assert found._exchanged(lag, [[bias, gain]]) is lag

@@ -309,11 +309,10 @@ class BeamSearch(Judge):
         for _ in range(_SWAPS if complete else _OPEN):
             rests = self.refits.without_each(current)
             in_place = self._in_place(current, rests, most, complete)
-            best = self._heaviest_of(current, in_place)
+            best = self._exchanged(current, in_place)
             if best is current:
                 return current, self._all_rivals(current, rests, in_place)
-            # With the new member, others may no longer be worth their parameters.
-            current = self.pruned(best)
+            current = best
             if self.refits.effort.over:
                 break
         return self._settled_among_known(current)
@@ -323,18 +322,25 @@ class BeamSearch(Judge):
         while True:
             rests = self.refits.without_each(current)
             known = [self._known_in_place(current, rest) for rest in rests]
-            best = self._heaviest_of(current, known)
+            best = self._exchanged(current, known)
             if best is current:
                 return current, self._all_rivals(current, rests, known)
             current = best
 
-    def _heaviest_of(self, current: Trial, in_place: Sequence[Sequence[Trial]]) -> Trial:
-        """Return the structure of most weight, of one and those with another member."""
-        best = current
-        for trial in itertools.chain(*in_place):
-            if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
-                best = trial
-        return best
+    def _exchanged(self, current: Trial, in_place: Sequence[Sequence[Trial]]) -> Trial:
+        """Return the first structure with another member that has more weight, or `current`.
+
+        Heaviest first. With the new member, others may no longer be worth their parameters: what
+        is left without these must have more weight.
+        """
+        behind = [(self.behind(t, current), t) for t in itertools.chain(*in_place)]
+        for nats, trial in sorted(behind, key=lambda pair: pair[0]):
+            if nats >= 0.0:
+                break
+            kept = self.pruned(trial) if pairs.both_worth(self, trial) else current
+            if self.behind(kept, current) < 0.0:
+                return kept
+        return current
 
     def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
         """Return the known refits with another effect in place of a member."""
