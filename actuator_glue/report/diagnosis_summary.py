@@ -84,7 +84,7 @@ def _meaning(found: DiagnosisData) -> str:
         return 'The model is enough for what moves; what is named below is in what measures it.'
     open_ = left_open(found)
     if open_ is not None:
-        known = 'Named, but not known' if found.structure else 'Not decided'
+        known = 'Named below, with parameters open' if found.structure else 'Not decided'
         return (
             f'{known}: of held-out records nothing but noise is left {open_.how}, and the '
             'fitting records leave that open.'

@@ -186,7 +186,7 @@ def test_what_one_stiffness_leaves_open_is_no_contradiction() -> None:
     page = named.first_page()
     told = ' '.join((*page.verdict, page.certainty))
     assert told.startswith('added, and left open by the fitting records: delay;')
-    assert 'Named, but not known' in told and 'remains beside' not in told
+    assert 'Named below, with parameters open' in told and 'remains beside' not in told
     assert page.command.split()[1:3] == ['diagnose', 'a.csv'] and 'c.csv' in page.command
     # Where no parameters explain all records, that is a contradiction.
     apart = replace(found, error=replace(found.error, reached=found.error.after))
