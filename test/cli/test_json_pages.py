@@ -141,6 +141,21 @@ def test_what_is_told_of_files(
     assert pages.unseen('info', 'map', 'recovery', 'sent', 'truth') == []
 
 
+@pytest.mark.parametrize(
+    ('unit', 'motion', 'factor'), [('deg', 'deg', 1e3), ('counts', 'counts', 1e6)]
+)
+def test_other_motions_stand_as_the_page_says(
+    asked, tmp_path: Path, unit: str, motion: str, factor: float
+) -> None:
+    """Whoever multiplies as the page says has what the file holds."""
+    u = 5.0 * np.sin(np.arange(400) / 20)
+    table = {'time_s': np.arange(400) / 100, f'command_{unit}': u, f'measured_{unit}': 0.9 * u}
+    pd.DataFrame(table).to_csv(tmp_path / 'made.csv', index=False)
+    (record,) = asked('info', tmp_path / 'made.csv')['files'][0]['records']
+    assert record['motion'] == motion
+    assert factor * np.array(record['command_m']) == pytest.approx([u.min(), u.max()])
+
+
 def test_what_doctor_found(
     asked, pages: JsonPages, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
