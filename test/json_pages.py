@@ -83,7 +83,7 @@ class Node:
             return self.fields[name]
         for pattern, node in self.fields.items():
             parts = re.split(r'<[^>]*>', pattern)
-            if len(parts) > 1 and re.fullmatch('.*'.join(map(re.escape, parts)), name):
+            if len(parts) > 1 and re.fullmatch('.+'.join(map(re.escape, parts)), name):
                 return node
         return None
 

@@ -174,7 +174,7 @@ def test_what_is_told_of_campaigns(
     monkeypatch.syspath_prepend(ROOT / 'test' / 'campaign')
     from laboratory_table import write_table
 
-    rows = {'group': ['a', 'b'], 'verdict': ['none', ''], 'failure': ['', 'no force']}
+    rows = {'group': ['a', 'b'], 'verdict': ['none', 'failed'], 'failure': ['', 'no force']}
     found = CampaignResult(
         tmp_path, Progress('finished', 2, computed=2, failed=1), pd.DataFrame(rows)
     )
