@@ -126,7 +126,7 @@ def vector(value: object, name: str) -> NDArray[np.float64]:
     """
     try:
         return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f'{name} is {_shown(value)}, which holds no numbers; give numbers'
         ) from None

@@ -41,6 +41,7 @@ NOT_RUN = {
     r'actuator-glue send': 'needs a receiver: test/streams, test/ros',
     r'actuator-glue doctor': 'asks what this computer is: test/cli',
     r'ssh|eval|tshark|openssl|head|printf|python3? ': 'tools of the system, told as examples',
+    r'jq ': 'asks JSON that a command wrote: test/cli/test_json_pages.py',
     r'(export )?[A-Z_]+=': 'settings of the environment',
 }
 # Commands of ours that are run elsewhere: a server, a receiver, this computer, a folder of tests.

@@ -114,6 +114,7 @@ class Calibration(PosteriorModel, CalibrationData):
             'initial': self.initial,
             'settle_s': self.settle,
             'records': [asdict(s) for s in self.sources],
+            'motion': self.motion,
             'tracking': [asdict(t) for t in self.tracking],
         }
 

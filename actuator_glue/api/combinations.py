@@ -82,6 +82,7 @@ class Combinations(Result, CombinationsData):
             'converged': self.converged,
             'effects': list(self.effects),
             'records': [asdict(source) for source in self.sources],
+            'motion': self.motion,
             'tracking': [asdict(each) for each in self.tracking],
             'evaluations': self.evaluations,
             'seconds': self.seconds,

@@ -110,6 +110,7 @@ class HistoryData:
                         'name': e.name,
                         'spells': [[s.begin, s.end, s.days] for s in e.spells],
                         'sizes': {n: [m, lo, hi] for n, _, m, lo, hi in e.sizes},
+                        'units': {n: unit for n, unit, *_ in e.sizes},
                         'probability_next': e.probability_next,
                     }
                     for e in self.effects

@@ -10,10 +10,9 @@ from typing import Any, Literal, get_args
 
 from actuator_glue.errors import InputError
 from actuator_glue.given import at_home
-from actuator_glue.given import path as path_given
 from actuator_glue.io.channel_map import ChannelMap, parse_channel_map
-from actuator_glue.io.partition import read_partition
-from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text
+from actuator_glue.io.partition import partition_file, read_partition
+from actuator_glue.io.yaml_file import choice, mapping, number, read_file, texts
 from actuator_glue.records import Hold, check_stiffness
 
 Diagnose = Literal['structure', 'always', 'never']
@@ -90,9 +89,8 @@ class Recipe:
         names = ('diagnose', 'false_alarms', 'draws', 'reports')
         out = {'calibrate': dict(self.calibrate), **{n: getattr(self, n) for n in names}}
         if self.partition is not None:
-            path = located(self.partition, 'partitions')
-            text = read_text(path, 'partition', '', 'partitions')
-            out |= {'partition': parse(text, str(path)), 'partition_name': path.stem}
+            path, content = partition_file(self.partition)
+            out |= {'partition': content, 'partition_name': path.stem}
         return out
 
 
@@ -102,9 +100,8 @@ def read_recipe(path: Path | str) -> Recipe:
     Raises:
         InputError: it cannot be read, an unknown entry, or a value that cannot be used.
     """
-    path = path_given(path)
-    text = read_text(path, 'recipe', 'a recipe is a page of text', 'recipes')
-    return parse_recipe(parse(text, f'{path}: recipe'), path.parent, f'{path}: recipe')
+    path, content = read_file(path, 'recipe', 'a recipe is a page of text', 'recipes')
+    return parse_recipe(content, path.parent, f'{path}: recipe')
 
 
 def parse_recipe(content: object, folder: Path, where: str = 'recipe') -> Recipe:
@@ -134,20 +131,14 @@ def parse_recipe(content: object, folder: Path, where: str = 'recipe') -> Recipe
     if unknown:
         raise InputError(f'{where}: group by {", ".join(KEYS)}, not {unknown[0]!r}')
     values['group'] = tuple(group)
-    if values.get('diagnose', 'structure') not in get_args(Diagnose):
-        raise InputError(
-            f'{where}: diagnose is {values["diagnose"]!r}; use one of '
-            f'{", ".join(get_args(Diagnose))}'
-        )
+    choice(values, 'diagnose', get_args(Diagnose), where)
     number(values, 'false_alarms', where, 1e-9, 1.0 - 1e-9)
     number(values, 'seconds', where, 1.0, 1e7)
     number(values, 'memory_gb', where, 0.25, 1e4)
     for name in ('draws', 'reports'):
         if not isinstance(values.get(name, False), bool):
             raise InputError(f'{where}: {name} must be true or false, not {values[name]!r}')
-    for name in ('names', 'table', 'holdout', 'partition'):
-        if not isinstance(values.get(name, ''), str):
-            raise InputError(f'{where}: {name} must be text, not {values[name]!r}')
+    texts(values, ('names', 'table', 'holdout', 'partition'), where)
     values['calibrate'] = _options(values.get('calibrate', {}), where)
     if 'table' in values:
         values['table'] = str(folder / at_home(values['table']))
@@ -169,9 +160,8 @@ def _rule(content: object, folder: Path, where: str) -> FileRule:
         raise InputError(f'{where}: match must be a pattern as "*.csv", not {values["match"]!r}')
     channels = values.get('channels')
     if isinstance(channels, str):
-        path = located(_here(channels, folder), 'channels')
-        text = read_text(path, 'channel map', 'a map is a page of text', 'channels')
-        channels = parse(text, f'{path}: channel map')
+        hint = 'a map is a page of text'
+        path, channels = read_file(_here(channels, folder), 'channel map', hint, 'channels')
         parse_channel_map(channels, str(path))
     elif channels is not None:
         parse_channel_map(channels, where)
@@ -180,8 +170,7 @@ def _rule(content: object, folder: Path, where: str) -> FileRule:
     if values.get('stiffness') is not None:
         values['stiffness'] = check_stiffness(values['stiffness'], where)
     number(values, 'resample', where, 0.1, 1e6)
-    if values.get('hold') not in (None, 'zoh', 'linear'):
-        raise InputError(f'{where}: hold is {values["hold"]!r}; use zoh or linear')
+    choice(values, 'hold', get_args(Hold), where)
     if not isinstance(values.get('split') or False, bool):
         raise InputError(f'{where}: split must be true or false, not {values["split"]!r}')
     return FileRule(**values)

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
 
 from actuator_glue.arguments import Output, add_force, make_room
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
 from actuator_glue.report.page_name import check_page_name
 
-T = TypeVar('T')
-
 _AN_HOUR = 3600.0  # s
-_MANY = 20  # of one kind that people still read
 
 
 def _told(text: str) -> str:
@@ -84,20 +79,6 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
 def note(line: str) -> None:
     """Print one remark on standard error."""
     print(f'note: {_told(line)}', file=sys.stderr)
-
-
-def few(found: Sequence[T], what: str, *paths: str) -> tuple[Sequence[T], list[str]]:
-    """Return the first of what may be thousands, and a line on how many more there are.
-
-    Args:
-        found: of one kind.
-        what: they are, in the plural.
-        paths: whose `info --json` has them all.
-    """
-    more, where = len(found) - _MANY, f'actuator-glue info {shlex.join(paths)} --split --json OUT'
-    whose = paths[0] if len(paths) == 1 else f'{len(paths)} files'
-    told = f'{whose}: {more} more {what}, {len(found)} in all: `{where}` has them'
-    return found[:_MANY], [told] if more > 0 else []
 
 
 def say(line: str, args: argparse.Namespace) -> None:

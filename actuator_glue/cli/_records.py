@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+import shlex
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from actuator_glue.arguments import Input, number, only_with, stiffness
-from actuator_glue.cli._output import few, note
+from actuator_glue.cli._as_asked import as_asked
+from actuator_glue.cli._output import note
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
+from actuator_glue.report.first_lines import few
 
 if TYPE_CHECKING:
     from actuator_glue.io.resample import Resample
+
+T = TypeVar('T')
 
 
 def add_records(parser: argparse.ArgumentParser) -> None:
@@ -80,6 +86,21 @@ def resampling(args: argparse.Namespace) -> Resample | None:
     return None if args.resample is None else (args.resample, args.resample_by or 'band-limited')
 
 
+def first_of(
+    found: Sequence[T], what: str, paths: Sequence[str], args: argparse.Namespace
+) -> tuple[Sequence[T], list[str]]:
+    """Return the first of what may be thousands, and a line on the command that has them all.
+
+    Args:
+        found: of one kind.
+        what: they are, in the plural.
+        paths: where they were found.
+        args: of this command; what it says of reading the paths, the other one needs, too.
+    """
+    every = as_asked(f'actuator-glue info {shlex.join(paths)} --split --json OUT', args)
+    return few(found, what, f'{len(found)} in all: `{every}` has them')
+
+
 def load(args: argparse.Namespace) -> list[Record]:
     """Return the records that the options name; where bags are split is told.
 
@@ -101,7 +122,7 @@ def load(args: argparse.Namespace) -> list[Record]:
             warn=note,
         )
     finally:
-        shown, more = few(gaps, 'gaps', *args.records)
+        shown, more = first_of(gaps, 'gaps', args.records, args)
         for line in (*shown, *more):
             note(line)
     speak(found[0].motion)

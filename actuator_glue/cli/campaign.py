@@ -14,13 +14,13 @@ from actuator_glue.arguments import Input, whole
 from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
+from actuator_glue.report.first_lines import few
 
 EXAMPLES = (
     'campaign records/ --out campaign --recipe campaign.yaml',
     'campaign --watch campaign',
 )
 _EVERY = 2.0  # s, between looks at another campaign
-_LISTED = 20  # failures that are printed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.watch is not None:
         others = (args.records, args.out, args.recipe, args.workers, args.scheduler, args.again)
-        if any(others):
+        if any((*others, args.json)):
             raise InputError('--watch looks at a campaign that runs; give it alone')
         return _watch(Path(args.watch))
     if not args.records or args.out is None:
@@ -102,10 +102,10 @@ def run(args: argparse.Namespace) -> int:
     failed = beside(args.json, lambda out: write_json(content, out))
     say(now.line(time.time()), args)
     table('Verdicts', ['verdict', 'groups'], [[str(v), str(n)] for v, n in verdicts.items()], args)
-    for _, row in failures.head(_LISTED).iterrows():
-        note(f'{row["group"]}: {row["failure"]}')
-    if len(failures) > _LISTED:
-        note(f'{len(failures) - _LISTED} more failures in {found.results}')
+    told = [f'{row["group"]}: {row["failure"]}' for _, row in failures.iterrows()]
+    shown, more = few(told, 'failures', f'all in {found.results}')
+    for line in (*shown, *more):
+        note(line)
     say(f'{len(found.table)} rows: {found.results}', args)
     return failed or (1 if now.failed else 0)
 

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.cli._output import add_json, few, note, say, table
-from actuator_glue.cli._records import add_records, resampling
+from actuator_glue.cli._output import add_json, note, say, table
+from actuator_glue.cli._records import add_records, first_of, resampling
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 from actuator_glue.io.units import factor
@@ -68,10 +68,10 @@ def run(args: argparse.Namespace) -> int:
             content['damage'].append(str(error))
         code = 2 if content['damage'] else code
         for kind, tell in (('damage', _damage), ('warnings', note)):
-            lines, more = few(content[kind], 'of such lines', path)
+            lines, more = first_of(content[kind], 'of such lines', [path], args)
             for line in (*lines, *more):
                 tell(line)
-        shown, more = few(records, 'records', path)
+        shown, more = first_of(records, 'records', [path], args)
         for record in shown:
             with speaking(record.motion):
                 _show(record, args)

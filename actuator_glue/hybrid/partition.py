@@ -195,7 +195,7 @@ def square(values: ArrayLike, name: str) -> Array:
     """
     try:
         matrix = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f'{name} is not a matrix of numbers ({error})') from error
     if matrix.ndim == 0:
         matrix = matrix.reshape(1, 1)

@@ -22,14 +22,23 @@ _KNOWN = (
 _OF_SPECIMEN = (*_STRUCTURE, 'mass_sd', 'damping_sd', 'stiffness_sd')
 
 
+def partition_file(given: Path | str) -> tuple[Path, object]:
+    """Return the file of a partition, there or of the package by its name, and what it says.
+
+    Raises:
+        InputError: no such file or name, no YAML.
+    """
+    hint = 'give the YAML file that describes a hybrid test'
+    return read_file(given, 'partition', hint, 'partitions', _LARGEST)
+
+
 def read_partition(given: Path | str) -> Partition:
     """Return the partition of a YAML file, or one that comes with the package by its name.
 
     Raises:
         InputError: no such file or name, no YAML, unknown or missing entries, wrong values.
     """
-    hint = 'give the YAML file that describes a hybrid test'
-    path, content = read_file(given, 'partition', hint, 'partitions', _LARGEST)
+    path, content = partition_file(given)
     try:
         return parse_partition(content, path.stem)
     except InputError as error:

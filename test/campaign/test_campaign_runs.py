@@ -293,6 +293,7 @@ def test_a_campaign_is_watched_from_elsewhere(
     [
         ([], 'give records and --out DIR'),
         (['records', '--watch', 'x'], 'give it alone'),
+        (['--watch', 'x', '--json', '-'], 'give it alone'),
         (['records', '--out', 'x', '--workers', '2', '--scheduler', 'y'], 'has its own'),
         (['records', '--out', 'x', '--workers', '0'], 'workers 0 is below 1'),
         (['nowhere', '--out', 'x'], 'no such file'),

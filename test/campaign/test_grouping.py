@@ -1,15 +1,18 @@
 """From files to tasks: names, tables, what files say themselves, and how each is read."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import actuator_glue as ag
 from actuator_glue.campaigns.grouping import Task, tasks_of
 from actuator_glue.campaigns.recipe import Recipe, parse_recipe, read_recipe
 from actuator_glue.io.export import write
+from actuator_glue.io.yaml_file import LARGEST
 
 NAMES = r'(?P<actuator>[a-z]+)_(?P<day>\d{4}-\d\d-\d\d)_(?P<specimen>[a-z]+)'
 
@@ -175,6 +178,24 @@ def test_a_recipe_is_a_yaml_file(tmp_path: Path) -> None:
     assert recipe.analysis()['partition_name'] == 'sdof'
     with pytest.raises(ag.InputError, match=r'nothing\.yaml'):
         read_recipe(tmp_path / 'nothing.yaml')
+
+
+def test_a_campaign_reads_every_partition_that_rths_reads(tmp_path: Path) -> None:
+    """Matrices of two hundred degrees of freedom are more than a page of text."""
+    matrix = np.eye(200).tolist()
+    (tmp_path / 'tower.yaml').write_text(
+        json.dumps(
+            {
+                'numerical': {'mass': 1000.0, 'damping_ratio': 0.05, 'stiffness': matrix},
+                'experimental': {'mass': 1.0, 'damping': 0.0, 'stiffness': 1e4},
+                'rate': 1024,
+            }
+        )
+    )
+    assert (tmp_path / 'tower.yaml').stat().st_size > LARGEST
+    analysis = recipe_of(tmp_path, partition='tower.yaml').analysis()
+    assert analysis['partition_name'] == 'tower'
+    assert analysis['partition']['numerical']['stiffness'] == matrix
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,13 @@
 """simulate, convert, info, recover, plot: files in, files out, one message where not."""
 
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from actuator_glue.cli._records import first_of
+from actuator_glue.cli.main import build_parser
 from actuator_glue.io.load import load_records
 
 
@@ -184,12 +187,29 @@ def test_of_very_many_gaps_a_few_are_told_and_where_the_rest_is(
     done = run('convert', bag, tmp_path / 'whole', '--split')
     assert done.code == 0
     assert done.err.count(' are missing before sample ') == 20
-    assert f'59 more gaps, {where}' in done.err
+    assert f'and 59 more gaps, {where}' in done.err
     # Of several files the rest may be of any of them.
     done = run('convert', short_bag, bag, tmp_path / 'both', '--split')
     assert done.code == 0
     where = f"`actuator-glue info {short_bag} '{bag}' --split --json OUT` has them"
-    assert f'2 files: 59 more gaps, 79 in all: {where}' in done.err
+    assert f'and 59 more gaps, 79 in all: {where}' in done.err
+
+
+@pytest.mark.parametrize('command', ['convert bag out', 'calibrate bag', 'info bag'])
+def test_the_command_that_has_the_rest_reads_as_this_one_did(command: str) -> None:
+    """Without its channel map it would find nothing in a bag of other topics."""
+    verb, *words = command.split()
+    asked = (verb, *words, '--channels', 'my map.yaml', '--hold', 'linear')
+    args = build_parser(verb).parse_args(asked)
+    first, more = first_of([*range(21)], 'gaps', ['bag'], args)
+    assert first == [*range(20)]
+    (line,) = more
+    said, _, again = line.removesuffix('` has them').partition('`')
+    assert said == 'and 1 more gaps, 21 in all: '
+    assert sorted(shlex.split(again)) == sorted(
+        [*shlex.split('actuator-glue info bag --split --json OUT'), *asked[-4:]]
+    )
+    assert first_of([*range(20)], 'gaps', ['bag'], args) == ([*range(20)], [])
 
 
 def test_pictures_of_records(run, tmp_path: Path, short_bag: Path, problem_r: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.cli._first_page import _as_asked
+from actuator_glue.cli._as_asked import as_asked
 from actuator_glue.cli.main import build_parser, main
 from actuator_glue.io.export import write
 from actuator_glue.report.first_page import command
@@ -150,7 +150,7 @@ def test_what_was_asked_for_is_asked_again(typed: str, said: str, told: str) -> 
     """Options that the next command has, too; those it says itself stand; it can be typed."""
     words = shlex.split(typed)
     args = build_parser(words[0]).parse_args(words)
-    following = _as_asked(f'actuator-glue {said}', args)
+    following = as_asked(f'actuator-glue {said}', args)
     assert following == f'actuator-glue {said} {told}'.rstrip()
     words = shlex.split(following)[1:]
     assert build_parser(words[0]).parse_args(words).run
@@ -162,11 +162,11 @@ def test_draws_that_are_kept_are_looked_at() -> None:
         ['calibrate', 'a.csv', '--channels', 'map.yaml', '--save', 'tuesday.npz']
     )
     said = 'actuator-glue calibrate a.csv --stiffness 0 --effect backlash --save posterior.npz'
-    assert _as_asked(said, args) == (
+    assert as_asked(said, args) == (
         'actuator-glue plot a.csv --stiffness 0 --draws tuesday.npz --channels map.yaml'
     )
     args.save = 'tuesday.mat'
-    assert _as_asked(said, args) == f'{said} --channels map.yaml'
+    assert as_asked(said, args) == f'{said} --channels map.yaml'
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,8 @@ def test_shipped_partitions_are_read_by_name() -> None:
         (('numerical', 'mass'), -1.0, 'positive definite'),
         (('numerical', 'stiffness'), [[1.0, 2.0], [3.0, 1.0]], 'not symmetric'),
         (('numerical', 'stiffness'), 'stiff', 'matrix of numbers'),
+        (('numerical', 'mass'), 10**400, 'numerical: mass is not a matrix of numbers'),
+        (('numerical', 'stiffness'), [[10**400]], 'numerical: stiffness is not a matrix'),
         (('numerical', 'damping_ratio'), 0.05, 'not both'),
         (('experimental', 'mass'), -1.0, 'negative'),
         (('experimental', 'stiffness'), 'stiff', 'number'),
@@ -61,6 +63,13 @@ def test_a_mistake_is_told(place: tuple[str, ...], value: object, said: str) -> 
     inner[place[-1]] = value
     with pytest.raises(ag.InputError, match=said):
         parse_partition(content)
+
+
+def test_a_large_whole_number_is_a_number() -> None:
+    """YAML has no limit to its digits; what a float holds is taken."""
+    content = deepcopy(GOOD)
+    content['numerical']['stiffness'] = 10**25
+    assert parse_partition(content).stiffness.tolist() == [[1e25]]
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
