@@ -53,3 +53,10 @@ def test_command_makes_the_bag(command: list[str], tmp_path: Path) -> None:
         assert (a.stiffness, a.period, a.hold, len(a)) == (b.stiffness, b.period, b.hold, len(b))
         assert np.abs(a.command - b.command).max() < TOLERANCE
         assert np.abs(a.measured - b.measured).max() < TOLERANCE
+
+
+@pytest.mark.slow
+def test_the_session_replays_to_the_bit(capsys: pytest.CaptureFixture[str]) -> None:
+    """As its page promises; a change of the sampler makes another session, recorded anew."""
+    code = main(['replay', str(BAGS / 'session')])
+    assert code == 0, f'make it again as {BAGS.name}/README.md says\n{capsys.readouterr().out}'
