@@ -14,7 +14,8 @@ import numpy as np
 from scipy.signal import lsim
 
 # The first two share next to no compiled code; the next need most of theirs, and some more for
-# records that tell more; the last take what those before have saved.
+# records that tell more; the last take what those before have saved, the very last compiled code of
+# the one before it.
 COMMANDS = [
     'simulate {0}/made.csv --duration 6 --rate 200 --stiffness 250e3 --effect backlash',
     'calibrate {0}/free.csv --stiffness 0 --evaluations 24000',
@@ -76,7 +77,8 @@ def main() -> None:
             ['-m', 'actuator_glue.cli.main', *command.format(folder).split()]
             for command in COMMANDS
         ]
-        for together in (lines[:2], lines[2:5], [['-c', WINDOWS], TESTS, *lines[5:]]):
+        *others, hybrid, last = lines
+        for together in (others[:2], others[2:], [hybrid, ['-c', WINDOWS], TESTS, last]):
             list(pool.map(run, together))
 
 
