@@ -14,8 +14,7 @@ import numpy as np
 from scipy.signal import lsim
 
 # The first two share next to no compiled code; the next need most of theirs, and some more for
-# records that tell more; the last take what those before have saved, the very last compiled code of
-# the one before it.
+# records that tell more; the last two take what those before have saved, and share their own.
 COMMANDS = [
     'simulate {0}/made.csv --duration 6 --rate 200 --stiffness 250e3 --effect backlash',
     'calibrate {0}/free.csv --stiffness 0 --evaluations 24000',
