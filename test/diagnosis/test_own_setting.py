@@ -31,7 +31,7 @@ def commands_forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ..
 def test_a_setting_is_tried_beside_a_learned_term(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command that grows with its rate, and an offset of the second record."""
     monkeypatch.setattr(refits, 'forms', commands_forms)
-    u, machine = sweep(2e-3, 8.0, 16.0), []
+    u, machine = sweep(2e-3, 8.0, 10.0), []
     given = u * (1.0 + 2.7 * RATE * np.abs(np.diff(u, prepend=0.0)))
     for k, offset in ((0.0, 0.0), (250e3, 5.0 * NOISE)):
         y = Structure(()).simulate(THETA, Record(given, given, 1.0 / RATE, k))
