@@ -1,5 +1,6 @@
 """Fixtures of every test."""
 
+import gc
 import os
 import subprocess
 from collections.abc import Callable
@@ -23,6 +24,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile('same')
+
+# What is imported and collected stays to the end: no garbage is looked for among it.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """From here on there is garbage."""
+    gc.freeze()
+    gc.enable()
+
 
 # A folder to write to, then a command: everything else is read-only, and nobody has a home.
 READ_ONLY = r"""

@@ -123,7 +123,7 @@ def test_the_force_is_used_on_request(run, problem_r: Path, tmp_path: Path) -> N
     test = ('--rate', 200, '--duration', 20, '--stiffness', 250e3)
     assert run('simulate', record, *test).code == 0
     out = tmp_path / 'c.json'
-    done = run('calibrate', record, '--use-force', '--evaluations', 20_000, '--json', out)
+    done = run('calibrate', record, '--use-force', '--evaluations', 12_000, '--json', out)
     assert done.code == 0, done.err
     content = json.loads(out.read_text())
     assert content['use_force'] is True
@@ -173,7 +173,7 @@ def test_a_record_that_does_not_start_at_rest(run, problem_r: Path, tmp_path: Pa
         start = 4000 + int(np.abs(record.measured[4000:4200]).argmin())
         pieces.append(tmp_path / f'p{i}.csv')
         write(pieces[-1], record.slice(start, len(record)), unit='m')
-    content = run('calibrate', *pieces, '--evaluations', 20_000, '--json', '-').json
+    content = run('calibrate', *pieces, '--evaluations', 12_000, '--json', '-').json
     assert (content['initial'], content['settle_s']) == ('measured', 1.0)
     assert abs(content['parameters']['beta_1']['mean'] - MEAN[0]) < 4 * STDDEV[0]
 
@@ -181,7 +181,7 @@ def test_a_record_that_does_not_start_at_rest(run, problem_r: Path, tmp_path: Pa
 def test_the_hold_matters_and_is_kept(run, problem_r: Path) -> None:
     """A wrong hold is a delay of half a sample: a worse fit and other parameters."""
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
-    options = ('--evaluations', 20_000, '--json', '-')
+    options = ('--evaluations', 12_000, '--json', '-')
     right, wrong = (
         run('calibrate', *records, *options, '--hold', h).json for h in ('zoh', 'linear')
     )
@@ -234,7 +234,7 @@ def test_results_do_not_depend_on_where_they_are_written(
     run, problem_r: Path, tmp_path: Path
 ) -> None:
     """The same seed gives the same numbers; the table is for people, the file for machines."""
-    options = ('calibrate', problem_r / 'r_2.csv', '--evaluations', 20000, '--seed', 3)
+    options = ('calibrate', problem_r / 'r_2.csv', '--evaluations', 12_000, '--seed', 3)
     first = run(*options, '--json', tmp_path / 'deep' / 'c.json')
     assert first.code == 1, 'problem R holds a gain that Eq. (2) cannot have'
     assert 'beta_1' in first.out

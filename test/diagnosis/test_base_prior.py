@@ -118,7 +118,7 @@ def test_what_one_stiffness_leaves_open_is_known_from_the_calibration() -> None:
     assert found.to_json()['prior']['source'] == 'monday.npz' and alone.prior is None
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 def test_a_prior_that_is_wrong_is_told_first() -> None:
     """An actuator that is softer by a tenth than a calibration to one per cent says."""
     records = make([], [], 7)

@@ -96,7 +96,7 @@ def test_prepared_records_say_what_was_done() -> None:
     assert abs(whole.masks[0].mean() - prepared.fit.masks[0].mean()) < 1e-3
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 @pytest.mark.parametrize(('effect', 'size'), [('quantisation', 4e-5), ('timing-jitter', 4e-4)])
 def test_what_lives_in_single_samples_is_found(effect: str, size: float) -> None:
     """A converter's step and a jittering clock at 2 kHz, with the size they have there.

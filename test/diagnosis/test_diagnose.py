@@ -101,7 +101,7 @@ def test_held_out_records_that_contradict_are_undecided() -> None:
     assert not any('held-out part leaves' in line for line in agrees.advice)
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 def test_noise_of_the_measurement_is_no_missing_effect() -> None:
     """Jitter of the clock removes no error: it is told as a part of the noise."""
     rng = np.random.default_rng(18)

@@ -1,10 +1,7 @@
 """A few blind machines, always the same: no score falls below the band of the published one."""
 
 import re
-import sys
-from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
-from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,20 +11,19 @@ from scipy.stats import binom
 
 ROOT = Path(__file__).parents[2]
 BLIND = ROOT / 'benchmarks' / 'blind'
-# Nine machines before the first of these tests.
+# Seven machines before the first of these tests.
 pytestmark = pytest.mark.timeout(1200)
-# From the seeds for calibration: of every generator a healthy machine, and one with a clear effect
-# (of `far` two), those that are quickly diagnosed.
+# From seeds of which nothing is reported, those that are quickly diagnosed. All are answered
+# rightly today; a band is that of the published scores all the same, and leaves one of three to
+# chance. What the catalogue lacks: test_learned.py.
 MACHINES = (
-    ('mixed', 917),  # valve-deadband
-    ('far', 907),  # valve-deadband
-    ('cases', 915),  # gain
-    ('far', 914),  # bias
-    ('variant', 915),  # specimen-gap
-    ('far', 912),
-    ('variant', 901),
-    ('mixed', 901),
-    ('cases', 923),
+    ('mixed', 94005),  # valve-null, one stiffness
+    ('variant', 908),  # drift and hum
+    ('far', 94009),  # valve-null, which cannot be told from a bias
+    ('far', 94019),  # integral action
+    ('cases', 901),
+    ('far', 903),  # 1200 samples a record, without and with a specimen
+    ('mixed', 94001),  # two stiffnesses, none free
 )
 _CHANCE = 0.05
 
@@ -40,19 +36,11 @@ def score() -> Any:
         yield import_module('score')
 
 
-def diagnosed(generator: str, seed: int, folder: Path) -> dict[str, Any]:
-    """Diagnose a machine as a campaign does, in a process of its own."""
-    sys.path.insert(0, str(BLIND))
-    found: dict[str, Any] = import_module('campaign').one(seed, folder / generator, generator, {})
-    return found
-
-
 @pytest.fixture(scope='module')
-def answers(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """Diagnose the machines, two at a time: they are the longest of all tests."""
-    folder = tmp_path_factory.mktemp('machines')
-    with ProcessPoolExecutor(2, get_context('spawn')) as pool:
-        return list(pool.map(diagnosed, *zip(*MACHINES, strict=True), [folder] * len(MACHINES)))
+def answers(score: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """Diagnose the machines as a campaign does; `score` knows the way to their generators."""
+    folder, one = tmp_path_factory.mktemp('machines'), import_module('campaign').one
+    return [one(seed, folder / generator, generator, {}) for generator, seed in MACHINES]
 
 
 def band(text: str, count: int) -> tuple[int, int]:
@@ -82,6 +70,15 @@ def test_no_score_falls_below_its_band(
     told = [(r['generator'], r['seed'], r['effects'], r['diagnosis']['summary']) for r in asked]
     least, most = band(question.text, len(asked))
     assert yes >= least if question.wanted else yes <= most, told
+
+
+def test_of_several_effects_all_are_named(
+    score: ModuleType, answers: list[dict[str, Any]]
+) -> None:
+    """Each makes the noise and more."""
+    question = score.QUESTIONS['pair_both_clear']
+    (pair,) = (r for r in answers if question.of(r))
+    assert question.yes(pair), pair['diagnosis']['summary']
 
 
 def test_what_is_named_is_removed(answers: list[dict[str, Any]]) -> None:

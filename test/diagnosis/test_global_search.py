@@ -40,6 +40,26 @@ def slopes_alone(data: Data) -> Fit:
     return fit(data, COULOMB, starts, iterations=8)
 
 
+def found_in(data: Data) -> Fit:
+    """What a population finds, from where the slopes end."""
+    return global_search.refit(data, COULOMB, slopes_alone(data), 8, 1e-4)
+
+
+def right(found: Fit) -> bool:
+    """Whether it is the lowest minimum."""
+    return found.rms < 1.2e-5 and found.theta[4] == pytest.approx(150.0, rel=0.04)
+
+
+def test_the_lowest_minimum_of_a_machine_is_found() -> None:
+    """Of one that the slopes miss; twice the same."""
+    data = Data.whole(held_up(1))
+    assert not right(slopes_alone(data))
+    found, again = found_in(data), found_in(data)
+    assert right(found)
+    np.testing.assert_array_equal(again.theta, found.theta)
+
+
+@pytest.mark.slow
 def test_the_lowest_minimum_is_found(rng_seed: int) -> None:
     """Slopes alone leave 10 to 59 um (median 22) where 10 are noise, the population 9.8 to 11.5.
 
@@ -47,15 +67,8 @@ def test_the_lowest_minimum_is_found(rng_seed: int) -> None:
     three of four are missed once in 300 000 tests even at 0.9 %.
     """
     seeds = np.random.default_rng(rng_seed).integers(1 << 31, size=4)
-    missed = 0
-    for seed in seeds.tolist():
-        data = Data.whole(held_up(seed))
-        slopes = slopes_alone(data)
-        found = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
-        missed += not (found.rms < 1.2e-5 and found.theta[4] == pytest.approx(150.0, rel=0.04))
+    missed = sum(not right(found_in(Data.whole(held_up(seed)))) for seed in seeds.tolist())
     assert missed < 3
-    again = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
-    np.testing.assert_array_equal(again.theta, found.theta)
 
 
 def test_what_is_found_is_never_worse_than_what_was_there() -> None:

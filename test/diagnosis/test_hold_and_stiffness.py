@@ -70,7 +70,7 @@ def test_a_held_command_that_was_given_as_linear_is_told() -> None:
     assert other is not None and (other.changed, set(other.hold)) == (('hold',), {'zoh'})
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 def test_a_command_that_ran_linearly_is_begun_with() -> None:
     """Nothing is searched for under the hold that was given: it would only imitate the lead."""
     wrong = [replace(r, hold='zoh') for r in machine(0.0, 250e3, hold='linear')]
@@ -86,7 +86,7 @@ def test_a_lead_of_about_half_a_sample_is_the_other_hold() -> None:
     assert other is not None and other.runs_linearly and other.enough
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> None:
     """Play under held commands, begun with linear ones."""
     settings, ready = Thresholds(), prepare(machine(0.0, 250e3, effect='backlash'), [])
@@ -99,7 +99,7 @@ def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> No
     assert {row.scope for row in result.rows()} >= {'', LINEAR}
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 @pytest.mark.parametrize('hold', ['zoh', 'linear'])
 def test_a_displacement_ahead_of_its_command_is_told(hold: Hold) -> None:
     """By 7.3 ms, nearly a sample; the other hold, which is a lead of half a sample, is not."""
@@ -130,7 +130,7 @@ def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
     assert found.error.after > 1.5 * found.error.noise_floor
 
 
-@pytest.mark.usefixtures('few_forms')
+@pytest.mark.usefixtures('few_forms', 'few_names')
 def test_a_lead_is_held_against_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """A gain that drifts: a lead alone explains most of it, and noise hides the rest."""
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / 'benchmarks' / 'blind'))

@@ -123,6 +123,7 @@ def test_draws_in_one_place_of_the_ridge_know_nothing_of_it() -> None:
     assert identified(space, draws, ridge).tolist() == [True, False, False, False]
 
 
+@pytest.mark.usefixtures('few_names')
 @pytest.mark.parametrize(
     ('theta', 'k'),
     [(STIFF_OIL, 250e3), pytest.param(STIFF_BOTH, 6.15e6, marks=pytest.mark.slow)],

@@ -67,7 +67,7 @@ def told(refits: Refits, trial: Trial) -> tuple[str, dict[str, tuple[float, floa
     return term.numbers, term.excited
 
 
-QUICK = ('learned-command-play', 'learned-force-friction')
+QUICK = ('learned-force-friction',)
 
 
 @pytest.mark.parametrize(

@@ -145,6 +145,7 @@ def test_what_appears_beside_what_eq_2_cannot_take_over(rng_seed: int) -> None:
     assert found.error.after < 3.6e-6
 
 
+@pytest.mark.usefixtures('few_names')
 @pytest.mark.parametrize('at', [pytest.param(0.0, marks=pytest.mark.slow), 100.0])
 def test_what_acts_all_the_time_or_never_has_no_onset(at: float) -> None:
     """A sweep that shows an effect only when it is fast does not make it appear."""

@@ -1,16 +1,21 @@
 """One record's own setting stands beside whatever was found, learned terms among it."""
 
+from collections.abc import Container
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 from two_sweeps import NOISE, RATE, selected_of, sweep
 
+from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.moves.own_setting import _with_setting
+from actuator_glue.diagnosis.refits import refits
 from actuator_glue.diagnosis.scopes.one_record import OneRecord
 from actuator_glue.diagnosis.verdict.both_parts import _acting, _where_it_acts
 from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.model.effects import Effect, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -18,17 +23,22 @@ THETA = np.array([230.0, 3.5e9, 4e5, 0.6])
 TERM = 'learned-command-u-absr'
 
 
-def test_a_setting_is_tried_beside_a_learned_term() -> None:
+def commands_forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
+    """Learned terms of the command alone."""
+    return tuple(effect for effect in forms(scale, known) if effect.place == 'command')
+
+
+def test_a_setting_is_tried_beside_a_learned_term(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command that grows with its rate, and an offset of the second record."""
-    u, machine = sweep(2e-3, 8.0, 16.0), []
+    monkeypatch.setattr(refits, 'forms', commands_forms)
+    u, machine = sweep(2e-3, 8.0, 10.0), []
     given = u * (1.0 + 2.7 * RATE * np.abs(np.diff(u, prepend=0.0)))
     for k, offset in ((0.0, 0.0), (250e3, 5.0 * NOISE)):
         y = Structure(()).simulate(THETA, Record(given, given, 1.0 / RATE, k))
         machine.append((k, u, y + offset))
     beam, found = selected_of(('gain', 'delay'), machine, sources=('w/a/1.csv', 'w/a/2.csv'))
-    refits = beam.refits
-    assert TERM in refits.terms()
-    best = refits.add(refits.trial(()), TERM)
+    assert TERM in beam.refits.terms()
+    best = beam.refits.add(beam.refits.trial(()), TERM)
     beam.renoise(best)
     found = beam.checked(best, found.singles, exchanged=False)
 

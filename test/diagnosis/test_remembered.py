@@ -48,7 +48,7 @@ def test_refits_begin_where_the_last_look_ended(name: str) -> None:
     the ridge that it leaves is another one in more data; with play none does.
     """
     cold_work, warm_work = 0.0, 0.0
-    for seed in range(5):
+    for seed in range(3):
         kept = Remembered()
         whole = streamed(name, 30.0, np.random.default_rng(seed))
         first = refitted(whole.slice(0, 3000), name, Effort(remembered=kept))

@@ -7,6 +7,7 @@ from two_sweeps import NOISE, RATE, THETA, motions, sweep
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.refits.refits import Refits
 from actuator_glue.diagnosis.search.beam_search import BeamSearch
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -33,10 +34,18 @@ def searching(data: Data, effort: Effort) -> BeamSearch:
     return BeamSearch(Refits(data, NAMES, effort=effort), Thresholds(), lambda stage, share: None)
 
 
-def test_an_answer_is_kept_where_impulses_are_removed_and_no_effort_is_left() -> None:
-    """A search from the beginning would end with its first effect."""
+@pytest.fixture(scope='module')
+def before() -> tuple[BeamSearch, Selection]:
+    """What was found before the impulses were removed."""
     dirty = searching(Data.whole(records(True)), Effort())
-    found = dirty.run()
+    return dirty, dirty.run()
+
+
+def test_an_answer_is_kept_where_impulses_are_removed_and_no_effort_is_left(
+    before: tuple[BeamSearch, Selection],
+) -> None:
+    """A search from the beginning would end with its first effect."""
+    dirty, found = before
     assert set(found.final.effects) == set(TRUE)
 
     clean = Data.whole(records(False))
@@ -52,10 +61,9 @@ def test_an_answer_is_kept_where_impulses_are_removed_and_no_effort_is_left() ->
     assert [t.effects for t in kept.singles] != []
 
 
-def test_going_on_costs_less_and_says_the_same() -> None:
+def test_going_on_costs_less_and_says_the_same(before: tuple[BeamSearch, Selection]) -> None:
     """With effort left, what is found from there is what is found from the beginning."""
-    dirty = searching(Data.whole(records(True)), Effort())
-    found = dirty.run()
+    dirty, found = before
     clean = Data.whole(records(False))
     anew = searching(clean, Effort())
     first = anew.run()

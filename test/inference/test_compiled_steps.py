@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,20 +18,25 @@ from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model import reference_problem
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import bounds
-from actuator_glue.records import Array
+from actuator_glue.records import Array, Record
 
-RECORDS = [record.slice(0, 4000) for record in reference_problem.records()]
 LOWER, UPPER = bounds()
 
 
+@cache
+def records() -> list[Record]:
+    """The beginning of both of problem R."""
+    return [record.slice(0, 4000) for record in reference_problem.records()]
+
+
 def glue() -> GlueLikelihood:
-    return GlueLikelihood(FastErrors(RECORDS), 256.0)
+    return GlueLikelihood(FastErrors(records()), 256.0)
 
 
 def window() -> tuple[_Density, Array, Array]:
     """One record in the coordinates of the online estimator."""
     problem = Problem(
-        (RECORDS[1].slice(500, 4000),), choose_model(), initial='measured', settle=0.2
+        (records()[1].slice(500, 4000),), choose_model(), initial='measured', settle=0.2
     )
     target = problem.target()
     transform = target.transform
@@ -52,11 +59,11 @@ def same(one: State, other: State) -> bool:
 CASES = {
     'glue': (glue, SamplerSettings()),
     'gaussian': (
-        lambda: GaussianLikelihood(FastErrors(RECORDS)),
+        lambda: GaussianLikelihood(FastErrors(records())),
         SamplerSettings(chains=7, thinning=3),
     ),
     'sigma': (
-        lambda: GaussianLikelihood(FastErrors(RECORDS), 1e-4),
+        lambda: GaussianLikelihood(FastErrors(records()), 1e-4),
         SamplerSettings(adaptation=17),
     ),
     # Half of the prior needs the exact kernel.

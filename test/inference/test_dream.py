@@ -83,7 +83,7 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
     Four of 16 would happen once in 5 000 runs of this test even if one start in fifty did.
     """
     target = targets.two_modes()
-    runs = _replicates(target, rng_seed, 16, 60_000, SamplerSettings())
+    runs = _replicates(target, rng_seed, 16, 30_000, SamplerSettings())
     share = np.array([(run.posterior()[:, 0] < 0.0).mean() for run in runs])
     both = [run for run, part in zip(runs, share, strict=True) if abs(part - 1 / 3) < 0.25]
     assert len(both) >= 13

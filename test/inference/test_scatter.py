@@ -26,12 +26,15 @@ def data(model: Structure, theta: Array) -> Data:
     return Data.whole(out)
 
 
-def test_a_lower_minimum_is_reached() -> None:
+@pytest.mark.parametrize(
+    ('count', 'above', 'left'), [(3, 2, 0), pytest.param(10, 6, 3, marks=pytest.mark.slow)]
+)
+def test_a_lower_minimum_is_reached(count: int, above: int, left: int) -> None:
     """A gap beside a valve's play: of ten starts six end above the noise, and one then."""
     model = Structure(('valve-null', 'specimen-gap', 'valve-hysteresis'))
     truth = np.array([*THETA, 3e-5, 2.8e-4, 4e-5])
     some = data(model, truth)
-    starts = truth * np.exp(np.random.default_rng(3).standard_normal((10, len(truth))))
+    starts = truth * np.exp(np.random.default_rng(3).standard_normal((count, len(truth))))
     ended = [fit(some, model, start, tolerance=1e-5) for start in starts]
     lower = [scattered(some, model, found, 1e-5) for found in ended]
     assert all(b.rms <= a.rms for a, b in zip(ended, lower, strict=True))
@@ -40,8 +43,8 @@ def test_a_lower_minimum_is_reached() -> None:
     def high(fits: list[Fit]) -> int:
         return sum(found.rms > 1.05 * NOISE for found in fits)
 
-    assert high(ended) >= 6
-    assert high(lower) <= 0.5 * high(ended)
+    assert high(ended) >= above
+    assert high(lower) <= left
 
 
 def test_a_lone_minimum_stays() -> None:

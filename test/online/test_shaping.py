@@ -89,7 +89,7 @@ def test_intervals_of_windows_hold_the_truth_under_coloured_noise(rng_seed: int)
     hits = 0
     for number in range(8):
         record, theta = machine((rng_seed, number), 0.9, seconds=20.0)
-        for window in ag.replay(record).windows[::5]:
+        for window in ag.replay(record, hop=5.0).windows:
             found = window.parameters['beta_1']
             hits += abs(found.mean - theta[0]) < 1.96 * found.stddev
     assert hits >= 25

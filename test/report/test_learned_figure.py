@@ -1,5 +1,6 @@
 """Curves of learned terms: what each adds over the range that was excited, with its band."""
 
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,14 +9,13 @@ import pytest
 
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import LearnedTerm
-from actuator_glue.model.effects import Scale
+from actuator_glue.model.effects import Effect, Scale
 from actuator_glue.model.effects.terms.definition import mapping
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.report.learned_figure import curve, learned_terms
 
 SCALE = Scale(2e-3, 0.1, 60.0, 1 / 256, 250e3, TABLE_2)
 T = np.arange(0.0, 10.0, 1 / 256)
-FORMS = {effect.name: effect for effect in forms(SCALE)}
 # Term, its parameters, and what the records excited.
 CASES: dict[str, tuple[tuple[float, ...], dict[str, tuple[float, float]]]] = {
     'learned-sensor-y3': ((2e4,), {'y': (-3e-3, 1e-3)}),
@@ -26,12 +26,18 @@ CASES: dict[str, tuple[tuple[float, ...], dict[str, tuple[float, float]]]] = {
 }
 
 
+@cache
+def by_name() -> dict[str, Effect]:
+    """All forms."""
+    return {effect.name: effect for effect in forms(SCALE)}
+
+
 def found(*names: str, spread: float = 0.1) -> Any:
     """A diagnosis with these terms, each parameter known to a share of itself."""
     rng = np.random.default_rng(1)
     terms, columns, draws = [], [], []
     for name in names:
-        effect, (values, excited) = FORMS[name], CASES[name]
+        effect, (values, excited) = by_name()[name], CASES[name]
         columns += [p.name for p in effect.parameters]
         draws += [v * (1.0 + spread * rng.standard_normal(2000)) for v in values]
         definition = mapping([effect])[name]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from test_diagnosis_report import diagnosis
 
 from actuator_glue.api.diagnosis import Diagnosis
@@ -47,12 +48,23 @@ def answers(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('actuator_glue.api.diagnosis.diagnose', lambda *_, **__: found)
 
 
+@pytest.fixture
+def laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of the report are laid out, which reads every text, and not drawn."""
+
+    def png(figure: Figure) -> bytes:
+        figure.draw_without_rendering()
+        return b'a picture'
+
+    monkeypatch.setattr('actuator_glue.report.style.png', png)
+
+
 def outputs(folder: Path, name: str) -> list[str]:
     """Return the options that ask for everything a command can write."""
     return ['--json', str(folder / f'{name}.json'), '--report', str(folder / f'{name}.html')]
 
 
-@pytest.mark.usefixtures('answers')
+@pytest.mark.usefixtures('answers', 'laid_out')
 def test_a_report_of_any_file_name(file: Path, tmp_path: Path) -> None:
     """Answer, JSON, report and pictures, whatever the name holds."""
     assert main(['diagnose', str(file), *outputs(tmp_path, 'd')]) == 0

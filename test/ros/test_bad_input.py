@@ -40,7 +40,7 @@ def children_of(pid):
 def test_estimator_and_recorder_outlive_every_bad_input(start, probe, tmp_path):
     bag = tmp_path / 'bag'
     recorder = start('recorder', bag=str(bag))
-    estimator = start('estimator', **QUICK)
+    estimator = start('estimator', diagnostics_period=0.2, **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')
     probe.open_stream(listeners=2)
 

@@ -48,7 +48,7 @@ def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe)
     probe.until(lambda: TOLD in probe.faults['estimator'], what='complaint')
     # Nothing comes any more, and nothing has changed.
     before = count()
-    probe.until(lambda: count() >= before + 10, what='complaint goes on')
+    probe.until(lambda: count() >= before + 3, what='complaint goes on')
 
     taken = probe.number('estimator', 'samples')
     probe.setup(index=probe.index)

@@ -30,7 +30,7 @@ def test_a_sign_is_told_until_it_is_mended(start, probe):
     )
     probe.open_stream()
     probe.setup()
-    record = motion(30.0)
+    record = motion(24.0)
     at = 0
 
     def stream(seconds, sign):
@@ -42,7 +42,7 @@ def test_a_sign_is_told_until_it_is_mended(start, probe):
     stream(11.0, -1.0)
     probe.until(lambda: TOLD in probe.faults['estimator'], what='complaint')
     assert not doubts[0]
-    stream(12.0, 1.0)
+    stream(7.0, 1.0)
 
     def count():
         return int(probe.value('estimator', 'channels (count)', 0))

@@ -162,13 +162,13 @@ CLOCKS = (0.0, 0.0), (0.0, 0.1), (5e-5, 0.05), (-2e-3, 0.0)
 )
 def test_times_need_not_be_multiples_of_the_period(phase, drift, jitter, epoch):
     """Where they lie half between, each second sample was taken for a repeated one."""
-    order = np.arange(4000)
-    order[[500, 501, 2000, 2001]] = [501, 500, 2001, 2000]
+    order = np.arange(2000)
+    order[[500, 501, 1500, 1501]] = [501, 500, 1501, 1500]
     lie = (1.0 + drift) * order + phase
     lie += jitter * np.random.default_rng(5).standard_normal(len(order))
     counts, index, command = by_time_alone(epoch + lie / 1000.0)
     assert +counts == {'reordered': 2}
-    assert np.array_equal(index, np.arange(4000)) and np.array_equal(order[command], index)
+    assert np.array_equal(index, np.arange(2000)) and np.array_equal(order[command], index)
 
 
 def test_times_tell_what_is_lost_repeated_and_far_off():
@@ -206,13 +206,13 @@ def test_a_gap_is_one_however_lines_arrive(size):
 )
 def test_times_of_few_digits_are_no_gaps(size, step):
     """A text of whole seconds: half of such a stream was said to be lost."""
-    counted = np.arange(300, 9300)
+    counted = np.arange(300, 6300)
     reception, index = in_order(np.floor(counted / 1000.0 / step) * step, size)
-    assert np.array_equal(index, np.arange(9000)) and not +reception.counts
-    gap = np.where(counted < 4100, counted, counted + 3000)
+    assert np.array_equal(index, np.arange(6000)) and not +reception.counts
+    gap = np.where(counted < 3100, counted, counted + 3000)
     reception, index = in_order(np.floor(gap / 1000.0 / step) * step, size)
     assert abs(reception.counts['lost'] - 3000) <= 1000.0 * step
-    assert len(index) == 9000
+    assert len(index) == 6000
 
 
 @pytest.mark.parametrize('size', [1, 20, 64])

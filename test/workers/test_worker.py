@@ -148,7 +148,7 @@ SCRIPT = """
 import os, sys, time
 import actuator_glue as ag
 print('begins', os.getpid())
-record = ag.simulate(ag.Command(rate=100.0, duration=12.0, high=5.0), stiffness=250e3, seed=3)
+record = ag.simulate(ag.Command(rate=100.0, duration=9.0, high=5.0), stiffness=250e3, seed=3)
 found = ag.replay(record, window=3.0, hop=0.5, evaluations=6000)
 from actuator_glue.workers.reports import Reports
 with Reports() as reports:  # long enough for whatever a process of its own would do
