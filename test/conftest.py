@@ -3,7 +3,7 @@
 import gc
 import os
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
@@ -25,14 +25,16 @@ settings.register_profile(
 )
 settings.load_profile('same')
 
-# What is imported and collected stays to the end: no garbage is looked for among it.
-gc.disable()
 
-
-def pytest_collection_finish() -> None:
-    """From here on there is garbage."""
-    gc.freeze()
-    gc.enable()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is imported and collected stays to the end: no garbage is looked for among it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 # A folder to write to, then a command: everything else is read-only, and nobody has a home.
