@@ -14,8 +14,8 @@ BLIND = ROOT / 'benchmarks' / 'blind'
 # Seven machines before the first of these tests.
 pytestmark = pytest.mark.timeout(1200)
 # From seeds of which nothing is reported, those that are quickly diagnosed. All names are right
-# today, and nothing is named of a healthy one; a band is that of the published scores all the same,
-# and leaves one of three to chance. What the catalogue lacks: test_learned.py.
+# today, and nothing is named of a healthy one; a band is that of the published scores all the
+# same, and leaves one of three to chance. What the catalogue lacks: test_learned.py.
 MACHINES = (
     ('mixed', 94005),  # valve-null, one stiffness
     ('variant', 908),  # drift and hum
