@@ -47,6 +47,8 @@ MACHINES = (
 )
 NAMES = """How often names were right that were given a probability. The curve from weights to
 probabilities was set with other machines (`benchmarks/blind/reliability.py --fit`)."""
+SECONDS = """Processor times are those of the computer as it was then: what runs beside a diagnosis
+makes them longer. [Speed](speed.md) has those of a quiet one."""
 PICTURE = '![Share of right names against the probability given](images/reliability.png)'
 
 
@@ -103,7 +105,7 @@ def page(results: list[Json], looked_at: Collection[str] = ()) -> str:
         + ' |'
     )
     names = reliability_table(bins(named(results)))
-    lines += ['', '## Names and probabilities', '', NAMES, '', names, '', PICTURE, '']
+    lines += ['', SECONDS, '', '## Names and probabilities', '', NAMES, '', names, '', PICTURE, '']
     return '\n'.join(lines)
 
 
