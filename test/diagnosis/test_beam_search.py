@@ -165,8 +165,9 @@ def test_a_member_gives_way_to_what_has_more_weight_in_the_end(
     found.renoise(gain)
     bias, lag, gain = (refits.trial(t.effects, t.added) for t in (bias, lag, gain))
     assert found.behind(gain, lag) < 0.0 < found.behind(bias, lag)
-    assert found._exchanged(lag, [[bias, gain]]).effects == ('gain',)
-    told, rivals = found._settled_among_known(lag)
+    better = found._exchanged(lag, [[bias, gain]])
+    assert better is not None and better.effects == ('gain',)
+    told, rivals = found.settle(lag, refitted=False)
     assert told.effects == ('gain',) and rivals['gain'][0].name == 'gain'
     monkeypatch.setattr(found, 'pruned', lambda _: bias)
-    assert found._exchanged(lag, [[bias, gain]]) is lag
+    assert found._exchanged(lag, [[bias, gain]]) is None

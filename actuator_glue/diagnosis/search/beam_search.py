@@ -272,8 +272,7 @@ class BeamSearch(Judge):
         Args:
             current: the structure.
             singles: every single effect, whatever noise it was scored with.
-            exchanged: whether rivals are refitted, and take a member's place where they are
-                better; else only rivals known already are reported.
+            exchanged: whether rivals are refitted; else those that are known already count.
         """
         self.progress('rivals', 0.0)
         current = self.pruned(current)
@@ -281,9 +280,8 @@ class BeamSearch(Judge):
             for name in current.effects:
                 current = self.refits.polish(replace(current, added=name))
             rest = self.left(current) >= BEATEN_NOISE * self.noise
-            current, rivals = self.settle(self.refits.finished(current, finely=rest))
-        else:
-            current, rivals = self._settled_among_known(current)
+            current = self.refits.finished(current, finely=rest)
+        current, rivals = self.settle(current, refitted=exchanged)
         taken, nats = self.refits.worth(current)
         return Selection(
             self.refits.trial(()), tuple(self.rescored(singles)), current, rivals, taken, nats,
@@ -297,50 +295,48 @@ class BeamSearch(Judge):
                 return self.pruned(rest)
         return current
 
-    def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
+    def settle(
+        self, current: Trial, *, refitted: bool
+    ) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
         """Exchange one member at a time for a rival of more weight, until none has more.
 
+        Args:
+            current: the structure.
+            refitted: whether rivals are refitted, for some rounds and while effort is left; then,
+                and else, those that are known count.
+
         Returns:
-            The structure, and the rivals of each of its members; where the rounds end with an
-            exchange, only the known ones.
+            The structure, and the rivals of each of its members.
         """
         complete = self.left(current) < self.material
         most = TRIED if complete else _OPEN_TRIED
-        for _ in range(_SWAPS if complete else _OPEN):
-            rests = self.refits.without_each(current)
-            in_place = self._in_place(current, rests, most, complete)
-            best = self._exchanged(current, in_place)
-            if best is current:
-                return current, self._all_rivals(current, rests, in_place)
-            current = best
-            if self.refits.effort.over:
-                break
-        return self._settled_among_known(current)
-
-    def _settled_among_known(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
-        """As `settle`, with the structures that are refitted already."""
+        rounds = (_SWAPS if complete else _OPEN) if refitted else 0
         while True:
             rests = self.refits.without_each(current)
-            known = [self._known_in_place(current, rest) for rest in rests]
-            best = self._exchanged(current, known)
-            if best is current:
-                return current, self._all_rivals(current, rests, known)
-            current = best
+            if rounds:
+                in_place = self._in_place(current, rests, most, complete)
+            else:
+                in_place = [self._known_in_place(current, rest) for rest in rests]
+            heavier = self._exchanged(current, in_place)
+            if heavier is None:
+                return current, self._all_rivals(current, rests, in_place)
+            current, rounds = heavier, 0 if self.refits.effort.over else max(0, rounds - 1)
 
-    def _exchanged(self, current: Trial, in_place: Sequence[Sequence[Trial]]) -> Trial:
-        """Return the first structure with another member that has more weight, or `current`.
+    def _exchanged(self, current: Trial, in_place: Sequence[Sequence[Trial]]) -> Trial | None:
+        """Return a structure with another member and more weight than the current one, if any.
 
-        Heaviest first. With the new member, others may no longer be worth their parameters: what
-        is left without these must have more weight.
+        The heaviest is tried first. With the new member, others may no longer be worth their
+        parameters: what remains without these must have more weight, too.
         """
         behind = [(self.behind(t, current), t) for t in itertools.chain(*in_place)]
         for nats, trial in sorted(behind, key=lambda pair: pair[0]):
             if nats >= 0.0:
                 break
-            kept = self.pruned(trial) if pairs.both_worth(self, trial) else current
-            if self.behind(kept, current) < 0.0:
-                return kept
-        return current
+            if pairs.both_worth(self, trial):
+                kept = self.pruned(trial)
+                if self.behind(kept, current) < 0.0:
+                    return kept
+        return None
 
     def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
         """Return the known refits with another effect in place of a member."""
