@@ -366,8 +366,8 @@ class Record:
         """Return the record of a test whose channels are arrays, columns of a table or lists.
 
         Args:
-            time: when each sample was taken, shape (n,), as those of all channels may be (n, 1) or
-                (1, n): seconds, datetimes of numpy or pandas, or times of day.
+            time: when each sample was taken, shape (n,): seconds, datetimes of numpy or pandas, or
+                times of day. A column or a row of a matrix will do, here and below.
             command: commanded displacement, shape (n,) [unit].
             measured: measured displacement, shape (n,) [unit].
             force: measured actuator force, shape (n,) [force_unit]; None where there is none.
@@ -388,8 +388,7 @@ class Record:
         motion, length = _of_unit(unit, moves, 'unit')
         forces = FORCE | TORQUES if motion == MOTIONS['deg'][0] else FORCE
         newton = _of_unit(force_unit, forces, 'force_unit')
-        time = _vector(time)
-        period, start_ns = _clock(time, '')
+        period, start_ns = _clock(_vector(time), '')
         channels = {'command': _vector(command), 'measured': _vector(measured)}
         if force is not None:
             channels['force'] = _vector(force)

@@ -97,7 +97,7 @@ class Streamer(base.SuiteNode):
         if there < wanted:
             missing = (
                 f'{wanted} subscribers of samples, {there} {"is" if there == 1 else "are"} there; '
-                'a node subscribes once its code is compiled, minutes after a first start'
+                'a node subscribes once its code is compiled, which takes minutes at a first start'
             )
         elif self.stamps_now and self.get_clock().now().nanoseconds == 0:
             # Simulated time is 0 until the first /clock: such stamps would jump with it.
