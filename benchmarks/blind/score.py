@@ -173,8 +173,7 @@ def row_weights(rows: list[Json], material: float, telling: float = TELLING) -> 
 def _behind(result: Json) -> float:
     """Nats by which the weight of the structure that is told is below the greatest."""
     rows = result['diagnosis']['structures']
-    weights = row_weights(rows, result['diagnosis']['alarm']['threshold'])
-    return next((-float(w) for w, r in zip(weights, rows, strict=True) if r['chosen']), np.inf)
+    return next((-float(r['log_weight']) for r in rows if r['chosen']), np.inf)
 
 
 QUESTIONS: dict[str, Question] = {

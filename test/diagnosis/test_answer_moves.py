@@ -99,8 +99,10 @@ def test_what_is_not_asked_for_is_not_taken() -> None:
     assert told.effects == () and len(told.history) == 1
 
 
-def test_no_move_is_begun_once_the_effort_is_spent() -> None:
+def test_no_move_that_refits_is_begun_once_the_effort_is_spent() -> None:
     assert followed((adding('a'),), effort=Effort(0.0)).effects == ()
+    known = replace(adding('a'), refits=False)
+    assert followed((known,), effort=Effort(0.0)).effects == ('a',)
 
 
 def test_the_steps_of_a_search_lead_to_what_it_found() -> None:

@@ -62,6 +62,14 @@ def test_which_effect_it_is_is_told_more_sharply() -> None:
     assert shared == pytest.approx(alone[0].log_weight - alone[1].log_weight)
 
 
+def test_where_material_error_remains_a_small_difference_tells_nothing() -> None:
+    """The printed weights are those that decided: all are wrong, and 1 um more tells little."""
+    rows = [row('gain', left=30.0, price=8.0), row('delay', left=31.0, price=8.0)]
+    sharp = weighed(rows, MATERIAL, ('gain',), '')[1].log_weight
+    blunt = weighed(rows, MATERIAL, ('gain',), '', complete=False)[1].log_weight
+    assert sharp == pytest.approx(100.0 * blunt)
+
+
 def test_another_hold_counts_as_an_addition() -> None:
     """It rivals an effect that imitates it, told by a fifth of what matters."""
     drift = row('gain-drift', left=np.hypot(10.0, 1.0), price=8.0)
@@ -84,15 +92,15 @@ def test_an_onset_must_matter() -> None:
 
 
 def answer(found: Row, left: float) -> Any:
-    """An answer that leaves so much structure [um]; more than 6 um is unexplained."""
-    verdict = 'unexplained' if left > 6.0 else 'missing-effect'
+    """An answer that leaves so much structure [um]."""
     out = SimpleNamespace(
         row=found,
         scope=found.scope,
         found=SimpleNamespace(material=MATERIAL),
-        decision=SimpleNamespace(verdict=verdict, left=1e-6 * left),
+        decision=SimpleNamespace(left=1e-6 * left),
     )
-    out.matters = vars(Conclusion)['matters'].fget(out)
+    for name in ('complete', 'matters'):
+        setattr(out, name, vars(Conclusion)[name].fget(out))
     return out
 
 

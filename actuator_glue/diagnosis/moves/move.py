@@ -39,12 +39,14 @@ class AnswerMove:
         make: returns another answer, told where it has more weight; None, or the same with more
             rows, where there is none.
         each_time: whether it is tried again on the same answer when a machine has more data.
+        refits: whether it refits anything; else it is tried where the effort is spent, too.
     """
 
     what: str
     when: Callable[[Conclusion], bool]
     make: Callable[[Conclusion, Asking], Conclusion | None]
     each_time: bool = True
+    refits: bool = True
 
     def made(self, result: Conclusion, asking: Asking) -> Conclusion | None:
         """Return another answer; None where this one stands, now or already with fewer data."""
@@ -71,15 +73,15 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
         asking: what they work with.
 
     Returns:
-        The last answer; each move that was taken is in its history. None is begun once the effort
-        is spent.
+        The last answer; each move that was taken is in its history. None that refits is begun once
+        the effort is spent.
     """
     for group in groups:
         moves = list(group)
         while moves:
             taken, heaviest = None, result
             for move in moves:
-                if result.effort.over or not move.when(result):
+                if (move.refits and result.effort.over) or not move.when(result):
                     continue
                 other = move.made(result, asking)
                 if other is None:
@@ -137,6 +139,11 @@ def left(result: Conclusion) -> bool:
     """Whether something material is left, and no record has a setting of its own."""
     material = result.decision.left >= result.found.material
     return (unexplained(result) or material) and result.found.final.own is None
+
+
+def without_own(result: Conclusion) -> bool:
+    """Whether no record has a setting of its own."""
+    return result.found.final.own is None
 
 
 def to(

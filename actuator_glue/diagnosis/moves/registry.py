@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from actuator_glue.diagnosis.moves.heaviest_known import heaviest_known
 from actuator_glue.diagnosis.moves.learned_terms import with_terms
 from actuator_glue.diagnosis.moves.move import (
     AnswerMove,
@@ -19,6 +20,7 @@ from actuator_glue.diagnosis.moves.move import (
     described,
     to,
     unexplained,
+    without_own,
 )
 from actuator_glue.diagnosis.moves.other_hold import other_hold
 from actuator_glue.diagnosis.moves.own_setting import own_setting
@@ -50,4 +52,5 @@ ACROSS: Final[Groups] = (
     (AnswerMove('two effects at once', unexplained, to(explained)),),
     (AnswerMove('effects that matter after all', complete, to(taken_for_noise)),),
     (AnswerMove('two effects for one', complete, to(exchanged)),),
+    (AnswerMove('the heaviest structure known', without_own, to(heaviest_known), refits=False),),
 )

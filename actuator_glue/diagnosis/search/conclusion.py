@@ -97,15 +97,19 @@ class Conclusion:
         count in units of what remains.
         """
         both = self, other
-        complete = any(answer.decision.verdict != 'unexplained' for answer in both)
+        complete = any(answer.complete for answer in both)
         units = [a.found.material if self.scope == other.scope else a.matters for a in both]
         return table.outweighs(self.row, other.row, min(units), complete)
 
     @property
+    def complete(self) -> bool:
+        """Whether nothing that matters is left."""
+        return self.decision.left < self.found.material
+
+    @property
     def matters(self) -> float:
         """Rms error that tells scopes apart: what matters, or what remains unexplained [m]."""
-        left = self.decision.left if self.decision.verdict == 'unexplained' else 0.0
-        return max(self.found.material, left)
+        return max(self.found.material, self.decision.left)
 
     def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""

@@ -130,6 +130,23 @@ class Judge:
         complete = self.left(nearest) < self.material
         return trials[int(np.argmax(table.weights(rows, self.material, complete)))]
 
+    def heaviest_known(self, told: Trial) -> Trial:
+        """Return the structure of the greatest weight of all that were refitted.
+
+        Args:
+            told: the reported one, returned where no other has more weight.
+        """
+        rows = table.rows(self.refits, self.refits.scorer)
+        ends = told, self.nearest_known()
+        complete = any(self.left(trial) < self.material for trial in ends)
+        best = rows[int(np.argmax(table.weights(rows, self.material, complete)))].effects
+        return told if set(best) == set(told.effects) else self.refits.trial(best)
+
+    def nearest_known(self) -> Trial:
+        """Return the structure of the least error of all that were refitted."""
+        known = self.refits.left_at_most(math.inf)
+        return self.refits.trial(min(known, key=lambda pair: pair[1].rms)[0].effects)
+
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
         """Return the weights of an effect's rivals, and of no effect, relative to its own.
 

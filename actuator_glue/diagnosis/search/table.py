@@ -130,7 +130,11 @@ def since(some: Iterable[Row], before: Fit, samples: int) -> tuple[Row, ...]:
 
 
 def weighed(
-    some: Iterable[Row], material: float, effects: tuple[str, ...], scope: str
+    some: Iterable[Row],
+    material: float,
+    effects: tuple[str, ...],
+    scope: str,
+    complete: bool = True,
 ) -> tuple[Row, ...]:
     """Return rows with their weights, greatest first (weights.py); of equal ones the better fit.
 
@@ -139,6 +143,7 @@ def weighed(
         material: least rms error that matters [m].
         effects: of the reported structure.
         scope: of the reported structure.
+        complete: whether the reported structure leaves nothing that matters.
     """
     best: dict[tuple[str, frozenset[str]], Row] = {}
     for r in sorted(some, key=lambda r: r.left_out):
@@ -147,7 +152,7 @@ def weighed(
     found = [
         replace(r, chosen=key == told, log_weight=float(weight))
         for (key, r), weight in zip(
-            best.items(), weights(list(best.values()), material), strict=True
+            best.items(), weights(list(best.values()), material, complete), strict=True
         )
     ]
     return tuple(sorted(found, key=lambda r: -r.log_weight))

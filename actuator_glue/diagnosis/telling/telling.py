@@ -96,7 +96,9 @@ def told(
         onset=result.onset,
         prior=prior,
         setup=both.setup,
-        structures=table.weighed(result.rows(), found.material, final.effects, result.scope),
+        structures=table.weighed(
+            result.rows(), found.material, final.effects, result.scope, result.complete
+        ),
         names=tuple(p.name for p in after.model.parameters),
         posterior=both.draws,
         which=drawn.mixture.which,
