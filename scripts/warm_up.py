@@ -30,7 +30,7 @@ COMMANDS = [
 # compiled most of it.
 WINDOWS = (
     'from actuator_glue.workers.warm import warm_prior, warm_windows; '
-    'warm_windows(); warm_windows(windows=2, carried=warm_prior())'
+    'warm_windows(); warm_windows(windows=1, carried=warm_prior())'
 )
 # pytest rewrites the assertions of each file once; at their first start four processes of
 # `make test` would do so four times, side by side.

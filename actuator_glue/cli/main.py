@@ -8,6 +8,8 @@ and heavy libraries only inside it.
 from __future__ import annotations
 
 import ast
+import atexit
+import gc
 import importlib
 import os
 import sys
@@ -21,6 +23,9 @@ from actuator_glue.cli._parser import Parser, examples
 from actuator_glue.cli._standard_streams import StandardStream, standard_streams
 from actuator_glue.errors import InputError
 from actuator_glue.motion import METRES, speak, spoken
+
+# What a process holds at its end is not searched for garbage: that takes up to a second.
+atexit.register(gc.freeze)
 
 
 def commands() -> dict[str, Path]:

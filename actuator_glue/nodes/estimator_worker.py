@@ -147,7 +147,7 @@ def warm_up() -> None:
         return computed(job, math.inf)[0]
 
     warm_windows(compute_whole)
-    warm_windows(compute_whole, windows=2, carried=warm_prior())
+    warm_windows(compute_whole, windows=1, carried=warm_prior())
     # Compiling does not count: ten windows would find no time left for sampling.
     _REPORT.forget()
     _TRACKING.forget()

@@ -242,3 +242,12 @@ def test_errors_become_one_line(
     if isinstance(error, ZeroDivisionError):
         with pytest.raises(ZeroDivisionError):
             run('info', 'x', '--debug')
+
+
+def test_the_end_of_a_command_looks_for_no_garbage() -> None:
+    """A process that had calibrated took a second to end."""
+    done = python(
+        'import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 0)); '
+        "from actuator_glue.cli.main import main; main(['--version'])"
+    )
+    assert done.stdout.splitlines()[-1] == 'True', done.stderr

@@ -86,16 +86,21 @@ def test_a_live_stream_has_nothing_left_to_compile(which: str) -> None:
 def test_warming_up_is_cut_short_by_no_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a minute of compiling it was called ready, with half still to be compiled."""
     ends: list[float] = []
+    evaluations = 0
 
     def note(job: Job, deadline: float) -> tuple[WindowResult, Tracked | None]:
+        nonlocal evaluations
         ends.append(deadline)
         found = computed(job, deadline)
         assert not found[0].failure and found[0].scored is not None
+        evaluations += found[0].evaluations
         return found
 
     monkeypatch.setattr(estimator_worker, 'computed', note)
     estimator_worker.warm_up()
     assert len(ends) > 5 and set(ends) == {math.inf}
+    # Nobody waits for more than it takes to call all of them: half of a start was sampling.
+    assert evaluations < 60_000
 
 
 @pytest.mark.slow
