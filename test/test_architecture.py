@@ -359,3 +359,13 @@ def test_command_line_imports_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == '[]'
+
+
+def test_parts_of_scipy_are_loaded_where_they_are_used() -> None:
+    """`import scipy` loads `scipy.signal` at its first use; `import scipy.signal`, at every start."""
+    eager = [
+        str(path.relative_to(ROOT))
+        for path in ROOT.rglob('*.py')
+        if re.search(r'^import scipy\.', path.read_text(encoding='utf-8'), re.MULTILINE)
+    ]
+    assert eager == []

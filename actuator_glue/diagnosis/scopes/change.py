@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from actuator_glue.diagnosis.score.weights import log_weight
 from actuator_glue.diagnosis.thresholds import TELLING

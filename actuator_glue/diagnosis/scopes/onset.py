@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from actuator_glue.diagnosis.scopes.change import Change
 from actuator_glue.diagnosis.scopes.moments import Moment
