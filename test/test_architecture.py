@@ -362,7 +362,7 @@ def test_command_line_imports_nothing_heavy() -> None:
 
 
 def test_parts_of_scipy_are_loaded_where_they_are_used() -> None:
-    """`import scipy` loads `scipy.signal` at its first use; `import scipy.signal`, at every start."""
+    """`import scipy` loads a part at its first use, `import scipy.signal` at every start."""
     eager = [
         str(path.relative_to(ROOT))
         for path in ROOT.rglob('*.py')
