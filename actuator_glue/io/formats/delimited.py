@@ -535,10 +535,11 @@ def _all_rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
 
 def is_remark(line: str, delimiter: str | None, width: int) -> bool:
     """Return whether a line is a comment, and no row of so many entries behind a `#`."""
-    entries = fields_of(uncommented(line), delimiter)
+    if (mark := _COMMENT.match(line)) is None:
+        return False
+    entries = fields_of(line[mark.end() :], delimiter)
     # Of blanks a sentence has as many.
-    row = len(entries) >= width and sum(map(is_number, entries)) > 1
-    return _COMMENT.match(line) is not None and not row
+    return len(entries) < width or sum(map(is_number, entries)) < 2
 
 
 def _block(
@@ -651,17 +652,31 @@ def _refuse_groups(path: Path, head: TextHead, at: list[int], columns: list[Arra
             or np.abs(milli - np.rint(milli)).max() > 1e-6
         ):
             continue
-        with open_text(path) as file:
-            rows = [fields_of(line, head.delimiter) for _, line in _rows(file, head)]
-        entries = [row[position] for row in rows if len(row) > position]
-        signed = [e for e in entries if head.decimal in e]
-        if len(signed) < len(entries) and all(map(_GROUPED.fullmatch, signed)):
+        if (grouped := _grouped(path, head, position)) is not None:
             raise InputError(
-                f'{path}: column {position + 1}: {signed[0]!r} may be '
-                f'{signed[0].replace(head.decimal, "")} or a fraction, and nothing in the column '
+                f'{path}: column {position + 1}: {grouped!r} may be '
+                f'{grouped.replace(head.decimal, "")} or a fraction, and nothing in the column '
                 'tells which; save the numbers without thousands separators, or say `decimal` in '
                 'a channel map'
             )
+
+
+def _grouped(path: Path, head: TextHead, position: int) -> str | None:
+    """Return the first number of a column with a decimal sign, if all may be thousands.
+
+    Some number has no such sign then; the first that has it and is no thousand ends the look.
+    """
+    first, whole = None, False
+    with open_text(path) as file:
+        for _, line in _rows(file, head):
+            for entry in fields_of(line, head.delimiter)[position : position + 1]:
+                if head.decimal not in entry:
+                    whole = True
+                elif _GROUPED.fullmatch(entry) is None:
+                    return None
+                else:
+                    first = first or entry
+    return first if whole else None
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
