@@ -14,6 +14,7 @@ from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.inference.prior_use import PriorUse
+from actuator_glue.model.exact import Initial
 from actuator_glue.records import Array, Record
 
 # Normal components of the prior that a calibration makes, at most.
@@ -71,7 +72,7 @@ class CalibrationData:
     likelihood: str
     shaping_factor: float | None
     seed: int
-    initial: str
+    initial: Initial
     settle: float
     evaluations: int
     seconds: float

@@ -62,11 +62,6 @@ class RecordTracking:
     predicted: dict[str, Spread]
     measured: dict[str, float]
 
-    @property
-    def title(self) -> str:
-        """Title of its table."""
-        return f'Tracking of {self.source or "the record"}'
-
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each number, under HEADER."""
         out = []
@@ -83,14 +78,13 @@ def tables(tracking: Sequence[RecordTracking]) -> list[html.Block]:
     """Return a table for each of the first records, and how many more there are."""
     from actuator_glue.report import html
 
-    first = [html.Table(HEADER, of.rows(), of.title) for of in tracking[:MOST]]
-    return [*first, *([html.Text(text)] if (text := more(tracking)) else [])]
-
-
-def more(tracking: Sequence[RecordTracking]) -> str:
-    """Return how many records have no table; nothing where all have one."""
-    count = len(tracking) - MOST
-    return f'tracking of {count} more records: the JSON has it' if count > 0 else ''
+    told: list[html.Block] = [
+        html.Table(HEADER, of.rows(), f'Tracking of {of.source or "the record"}')
+        for of in tracking[:MOST]
+    ]
+    if (more := len(tracking) - MOST) > 0:
+        told.append(html.Note(f'tracking of {more} more records: the JSON has it'))
+    return told
 
 
 def ready(records: Sequence[Record]) -> list[Record]:

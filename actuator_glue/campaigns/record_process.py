@@ -46,7 +46,7 @@ class RecordProcess:
         self._process: subprocess.Popen[bytes] | None = None
 
     def row(self, task: Task, folder: Path, key: str, seconds: float) -> Row:
-        """Return what the analysis makes of a task, or why there is nothing by then [s]."""
+        """Return what the analysis makes of a task in so many seconds, or why that is nothing."""
         process = self._started()
         assert process.stdin is not None
         order = {'task': task.to_json(), 'folder': str(folder), 'key': key}

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, add_force, make_room
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
 from actuator_glue.report.page_name import check_page_name
+
+if TYPE_CHECKING:
+    from actuator_glue.report.html import Block
 
 _AN_HOUR = 3600.0  # s
 
@@ -109,6 +113,20 @@ def table(
     # A number that is cut off is worse than a line that the terminal folds.
     needed = console.measure(shown, options=console.options.update(max_width=500)).maximum
     Console(file=file, highlight=False, width=max(console.width, needed)).print(shown)
+
+
+def show(blocks: Iterable[Block], args: argparse.Namespace) -> None:
+    """Print blocks of a report but its pictures; notes go to standard error."""
+    from actuator_glue.report.html import Note, Picture, Table
+
+    for block in blocks:
+        if isinstance(block, Table):
+            rows = [[str(cell) for cell in row] for row in block.rows]
+            table(block.caption, block.header, rows, args)
+        elif isinstance(block, Note):
+            note(block.text)
+        elif not isinstance(block, Picture):
+            say(block.text, args)
 
 
 @contextmanager

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, number, number_or_auto, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
-from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, show
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -160,7 +161,8 @@ def _combinations(
 ) -> int:
     """Print what holds without a stiffness, and return the exit code."""
     from actuator_glue.api.combinations import combinations
-    from actuator_glue.api.combinations_report import HEADER, TITLE, rows
+    from actuator_glue.api.combinations_report import moments
+    from actuator_glue.api.tracking import tables
 
     if args.partition is not None:
         raise InputError('a hybrid test cannot be judged without the specimen stiffness; give it')
@@ -175,23 +177,12 @@ def _combinations(
     failed = beside(args.json, lambda out: write_json(content, out))
     failed = beside(args.save, _saving(found, args)) or failed
     following = show_first(found.first_page(), args)
-    table(TITLE, HEADER, rows(found), args)
-    _tracking(found, args)
+    show([moments(found), *tables(found.tracking)], args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
     for line in found.notes[1:]:
         note(line)
     failed = beside(args.report, lambda out: found.report(out, following)) or failed
     return failed or (1 if found.problems else 0)
-
-
-def _tracking(found: Calibration | Combinations, args: argparse.Namespace) -> None:
-    from actuator_glue.api.tracking import HEADER, more
-    from actuator_glue.report.worst import MOST
-
-    for of in found.tracking[:MOST]:
-        table(of.title, HEADER, of.rows(), args)
-    if text := more(found.tracking):
-        note(text)
 
 
 def _saving(found: Calibration | Combinations, args: argparse.Namespace) -> Callable[[str], Path]:
@@ -234,21 +225,16 @@ def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
 
 def _show(found: Calibration, args: argparse.Namespace) -> str:
     """Print the answer; return the command that it says to type next."""
-    from actuator_glue.api.calibration_report import (
-        HEADER,
-        moment_rows,
-        moments_title,
-    )
+    from actuator_glue.api.calibration_report import moments
+    from actuator_glue.api.tracking import tables
 
     following = show_first(found.first_page(args.partition), args)
-    rows: list[tuple[str, ...]] = moment_rows(found)
-    columns: tuple[str, ...] = HEADER
+    known = moments(found)
     mostly = ['prior' if p.prior_dominated else '' for p in found.parameters.values()]
     if any(mostly):
-        rows = [(*row, text) for row, text in zip(rows, mostly, strict=True)]
-        columns = (*columns, 'mostly')
-    table(moments_title(found), columns, rows, args)
-    _tracking(found, args)
+        rows = [(*row, text) for row, text in zip(known.rows, mostly, strict=True)]
+        known = replace(known, header=(*known.header, 'mostly'), rows=rows)
+    show([known, *tables(found.tracking)], args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
     if found.compile_seconds > 0.5:
         say(f'{found.compile_seconds:.1f} s of compilation besides, once per installation', args)
