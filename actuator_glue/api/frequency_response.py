@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -15,9 +15,6 @@ from actuator_glue.given import vector
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 DEFAULT = (0.1, 30.0, 200)  # Hz: from, to, how many
 _BANDS = 120  # of equal ratio, from one line of the spectrum to the highest
@@ -228,25 +225,6 @@ def measured_response(record: Record) -> MeasuredResponse:
     turns = np.unwrap(np.angle(response[used]))
     turns -= 2.0 * np.pi * np.rint(turns[0] / (2.0 * np.pi))
     return MeasuredResponse(middle[used], np.abs(response[used]), np.degrees(turns))
-
-
-def bode_figure(responses: Sequence[tuple[str, FrequencyResponse]]) -> Figure:
-    """Return a figure of responses side by side, each under its title."""
-    from actuator_glue.report.bode_figure import Bode, bode
-
-    return bode(
-        [
-            Bode(
-                title,
-                of.frequency,
-                of.gain,
-                of.phase,
-                of.delay,
-                None if of.measured is None else of.measured,
-            )
-            for title, of in responses
-        ]
-    )
 
 
 def title(of: FrequencyResponse, name: str = '') -> str:

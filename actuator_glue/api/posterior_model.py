@@ -136,7 +136,9 @@ class PosteriorModel(Result):
                 shown.append((response.title(found), found))
         if not shown:
             raise InputError('give a record, or a specimen stiffness [N/m] as stiffness=0.0')
-        return response.bode_figure(shown)
+        from actuator_glue.api.bode_figure import bode_figure
+
+        return bode_figure(shown)
 
     def hybrid(self, partition: Partition | Path | str | None) -> str:
         """Return what the actuator means for a hybrid test, in a sentence; empty without one.
