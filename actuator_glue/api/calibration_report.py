@@ -12,7 +12,8 @@ from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.calibration_error import best_residuals
 from actuator_glue.api.calibration_parts import FitError, Marginal
 from actuator_glue.api.combinations_data import CombinationsData
-from actuator_glue.api.ensemble import evenly, simulated
+from actuator_glue.api.drawn import evenly
+from actuator_glue.api.ensemble import simulated
 from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.convergence import APART

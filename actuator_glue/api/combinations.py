@@ -21,7 +21,6 @@ from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
 from actuator_glue.diagnosis.verdict.residual_structure import DIAGNOSE
 from actuator_glue.errors import InputError
-from actuator_glue.given import path as given_path
 from actuator_glue.hygiene.checks import pull
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.model.structure import Structure
@@ -148,7 +147,7 @@ class Combinations(Result, CombinationsData):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(given_path(path), self.page(next_command))
+            return html.write(path, self.page(next_command))
 
 
 @takes(CalibrationOptions)

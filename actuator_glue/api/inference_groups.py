@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.calibration_data import CalibrationData
-from actuator_glue.api.ensemble import SIZE
+from actuator_glue.api.drawn import SIZE, evenly
 from actuator_glue.hybrid.actuator import table_of
 from actuator_glue.inference.likelihood import PHI
 from actuator_glue.inference.predictive import ResidualModel, predictive_draws
@@ -75,7 +75,7 @@ def dataset(
 def _of_records(found: CalibrationData) -> dict[str, xarray.Dataset]:
     steps, chains, _ = found.draws.shape
     each = max(2, -(-SIZE // chains))
-    used = np.unique(np.linspace(0, steps - 1, min(each, steps)).astype(np.intp))
+    used = evenly(np.arange(steps), each)
     rows = np.ascontiguousarray(found.draws[used].reshape(len(used) * chains, -1))
     shape = (len(used), chains)
     phi = rows[:, found.names.index(PHI.name)] if PHI.name in found.names else None

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.api import frequency_response as response
-from actuator_glue.api.drawn import Drawn
-from actuator_glue.api.ensemble import GivenCommand, commanded, evenly, simulated
+from actuator_glue.api.drawn import Drawn, evenly
+from actuator_glue.api.ensemble import GivenCommand, commanded, simulated
 from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
@@ -21,7 +21,6 @@ from actuator_glue.api.matlab import Exported, under, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
 from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
-from actuator_glue.given import path as given_path
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.motion import speaking
 from actuator_glue.records import Hold, check_stiffness, source_names
@@ -190,7 +189,7 @@ class PosteriorModel(Result):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(given_path(path), self.page(partition, next_command))
+            return html.write(path, self.page(partition, next_command))
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""

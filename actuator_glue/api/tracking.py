@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_glue.api.drawn import evenly
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.diagnosis.telling.response import amplitude_of, harmonic, near, phases
 from actuator_glue.hybrid.actuator import actuator, table_of
@@ -185,8 +186,7 @@ def record_tracking(
 
 def _some(draws: Array, names: Sequence[str], structure: Structure, most: int) -> Array:
     """Return some of the draws, without parameters of the likelihood."""
-    rows = np.linspace(0, len(draws) - 1, min(most, len(draws))).astype(np.intp)
-    return table_of(draws[rows], names, structure)
+    return table_of(evenly(draws, most), names, structure)
 
 
 def _sines(

@@ -1,11 +1,10 @@
-"""What commands write for people: lines, tables, progress."""
+"""What commands write for people: lines, tables, blocks of a report."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, add_force, make_room
@@ -15,8 +14,6 @@ from actuator_glue.report.page_name import check_page_name
 
 if TYPE_CHECKING:
     from actuator_glue.report.html import Block
-
-_AN_HOUR = 3600.0  # s
 
 
 def _told(text: str) -> str:
@@ -127,28 +124,3 @@ def show(blocks: Iterable[Block], args: argparse.Namespace) -> None:
             note(block.text)
         elif not isinstance(block, Picture):
             say(block.text, args)
-
-
-@contextmanager
-def progress(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar with time left on standard error; yields `done(amount so far)`.
-
-    Nothing is drawn where standard error is no terminal.
-    """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    bar = Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        TextColumn('{task.percentage:>3.0f} %'),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-        speed_estimate_period=_AN_HOUR,  # shares are of the whole, so the time left is, too
-    )
-    with bar:
-        task = bar.add_task(title, total=total)
-        yield lambda amount: bar.update(task, completed=amount)

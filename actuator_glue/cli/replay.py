@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, number, number_or_auto, whole
-from actuator_glue.cli._output import add_json, note, progress, say, show
+from actuator_glue.cli._output import add_json, note, say, show
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
 

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, Output, number, whole
-from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 

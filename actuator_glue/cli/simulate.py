@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, claim, given, number, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
-from actuator_glue.cli._output import note, progress
+from actuator_glue.cli._output import note
 from actuator_glue.cli._save import add_out, check_out, save
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
