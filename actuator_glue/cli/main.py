@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from actuator_glue import cli
+from actuator_glue import __version__, cli
 from actuator_glue.arguments import claim_outputs
 from actuator_glue.cli._parser import Parser, examples
 from actuator_glue.cli._standard_streams import StandardStream, standard_streams
@@ -88,7 +88,7 @@ def _run(argv: list[str], out: StandardStream) -> int:
         parser = build_parser(chosen)
         args = parser.parse_args(argv)
         if args.version:
-            print(f'actuator-glue {_version()}')
+            print(f'actuator-glue {__version__}')
             return 0
         if args.command is None:
             parser.print_help()
@@ -120,15 +120,6 @@ def _fail(message: str, code: int, debug: bool) -> int:
         raise
     print(f'actuator-glue: {spoken(message)}', file=sys.stderr)
     return code
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version('actuator_glue')
-    except PackageNotFoundError:
-        return 'not installed (source checkout)'
 
 
 if __name__ == '__main__':
