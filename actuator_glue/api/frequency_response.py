@@ -91,7 +91,11 @@ def frequency_response(
     Raises:
         InputError: frequencies that are not positive.
     """
-    hertz = _positive(np.geomspace(*DEFAULT) if frequencies is None else frequencies)
+    given = np.geomspace(*DEFAULT) if frequencies is None else frequencies
+    hertz = np.atleast_1d(vector(given, 'frequencies'))
+    if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
+        raise InputError('frequencies must be positive numbers [Hz]')
+    hertz = np.sort(hertz)
     gain, phase = _response(draws, names, structure, stiffness, hertz)
     return _limits(gain, phase, hertz, structure, stiffness)
 
@@ -101,7 +105,6 @@ def recorded_response(
     names: Sequence[str],
     structure: Structure,
     record: Record,
-    frequencies: ArrayLike | None = None,
 ) -> FrequencyResponse:
     """Return the response that draws expect between the samples of a record, and the record's own.
 
@@ -112,16 +115,13 @@ def recorded_response(
         names: parameter of each column; those of a likelihood are passed over.
         structure: the model.
         record: the test; its stiffness must be known.
-        frequencies: shape (f,) [Hz]; None for those that the record excited.
 
     Raises:
-        InputError: frequencies that are not positive, or a record that excites none.
+        InputError: a record that excites no frequency.
     """
     measured = measured_response(record)
-    if frequencies is None:
-        highest = min(1.5 * float(measured.frequency[-1]), 0.45 * record.rate)
-        frequencies = np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2])
-    hertz = _positive(frequencies)
+    highest = min(1.5 * float(measured.frequency[-1]), 0.45 * record.rate)
+    hertz = np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2])
     stiffness = record.known_stiffness()
 
     def expected(at: Array) -> tuple[Array, Array]:
@@ -138,13 +138,6 @@ def recorded_response(
     measured = measured._replace(phase=measured.phase + 360.0 * turns)
     gain, phase = expected(hertz)
     return _limits(gain, phase, hertz, structure, stiffness, measured)
-
-
-def _positive(frequencies: ArrayLike) -> Array:
-    hertz = np.atleast_1d(vector(frequencies, 'frequencies'))
-    if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
-        raise InputError('frequencies must be positive numbers [Hz]')
-    return np.sort(hertz)
 
 
 def _response(
