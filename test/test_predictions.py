@@ -64,6 +64,12 @@ def test_a_prediction_covers_a_test_that_nobody_fitted(
     table = found.to_dataframe()
     assert table.index[1] == 1 / RATE and list(table['upper']) == list(found.upper)
     assert 'measured inside' in repr(found) and 'array(' not in repr(found)
+    # Under another stiffness nothing was measured; where a record leaves its own open, it is this.
+    other = posterior.predict(unseen, k + 50e3)
+    assert other.measured is None and 'measured inside' not in repr(other)
+    left_open = replace(unseen, stiffness=None)
+    for record in (unseen, left_open):
+        assert posterior.predict(record, k).inside == found.inside
 
 
 def test_a_shape_is_a_command(posterior: ag.Calibration, tmp_path: Path) -> None:

@@ -66,26 +66,38 @@ def residual_of(parts: Sequence[Array], parameters: int) -> ResidualModel | None
 
 
 def commanded(
-    command: GivenCommand, stiffness: float | None, rate: float | None, hold: Hold | None
+    command: GivenCommand,
+    stiffness: float | None,
+    rate: float | None,
+    hold: Hold | None,
+    motion: str,
 ) -> tuple[Record, bool]:
     """Return a test that is to be simulated, and whether its displacement was measured.
+
+    What was measured under another stiffness is none of this test.
 
     Args:
         command: a shape, a record or a file of one, or samples [m].
         stiffness: specimen stiffness [N/m]; None for what the record says.
         rate: of samples [Hz]; shapes and records have their own.
         hold: how samples run from one to the next; None for what the record says, else 'zoh'.
+        motion: what the draws were fitted to, which a record must move in.
 
     Raises:
-        InputError: samples without a rate or with an impossible one, no stiffness, or what is no
-            command.
+        InputError: a record that moves in another unit, samples without a rate or with an
+            impossible one, no stiffness, or what is no command.
     """
     if isinstance(command, Command):
         samples, period = command.samples(), 1.0 / command.rate
     elif isinstance(command, (Record, str, PathLike)):
         record = one_record_given(command)
+        if record.motion != motion:
+            raise InputError(
+                f'the command moves in {record.motion}, and what was fitted moves in {motion}'
+            )
         k = record.known_stiffness() if stiffness is None else check_stiffness(stiffness)
-        return replace(record, stiffness=k, hold=hold or record.hold), True
+        measured = record.stiffness in (None, k)
+        return replace(record, stiffness=k, hold=hold or record.hold), measured
     else:
         samples = vector(command, 'command')
         if samples.ndim != 1:

@@ -64,7 +64,7 @@ class PosteriorModel(Result):
         Args:
             command: a shape (`Command`), a record or a file of one, or samples [m], shape (n,).
             stiffness: specimen stiffness [N/m], 0 for a free actuator; None for what a record
-                says.
+                says, whose displacement counts as measured under its own alone.
             rate: of samples [Hz]; shapes and records have their own.
             hold: how samples run from one to the next, 'zoh' or 'linear'; None for what a record
                 says, else 'zoh'.
@@ -77,11 +77,7 @@ class PosteriorModel(Result):
             >>> posterior.predict(Command('earthquake'), 250e3).plot()  # doctest: +SKIP
         """
         of = self.drawn()
-        record, measured = commanded(command, stiffness, rate, hold)
-        if measured and record.motion != self.motion:
-            raise InputError(
-                f'the command moves in {record.motion}, and what was fitted moves in {self.motion}'
-            )
+        record, measured = commanded(command, stiffness, rate, hold, self.motion)
         moved = simulated(evenly(of.draws), of.names, of.structure, record)
         found = prediction(record, moved, of.residual, measured=measured, problems=of.problems)
         return replace(found, motion=self.motion)

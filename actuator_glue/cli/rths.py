@@ -115,11 +115,16 @@ def run(args: argparse.Namespace) -> int:
         if motion is None:
             raise InputError('--scale needs a --ground-motion to scale')
         motion = motion.scaled(args.scale)
+    criteria: dict[str, float] = {}
+    for name, limit in args.fail or ():
+        if name in criteria:
+            raise InputError(f'--fail {name}: one limit for each; take the others out')
+        criteria[name] = limit
     calibration = Calibration.load(args.posterior)
     options = {
         'draws': args.draws,
         'frequencies': args.frequency or FREQUENCIES,
-        'criteria': dict(args.fail or ()),
+        'criteria': criteria,
         'seed': args.seed,
     }
     compared = None
