@@ -13,7 +13,6 @@ from actuator_glue.api.calibration_options import CalibrationChanges, Calibratio
 from actuator_glue.api.calibration_parts import CalibratedRecord, RecordForce, marginals
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.calibration_shaping import sampled
-from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.compilation import compilation
 from actuator_glue.api.ensemble import residual_of
 from actuator_glue.api.given import Records, Stiffness, records_given
@@ -87,7 +86,7 @@ def calibrate(
         refuse_known(tests, given_before.sketches, given_before.source)
     started = time.perf_counter()
     with (
-        shown('calibrate', options.evaluations, False if callable(progress) else progress) as bar,
+        shown('calibrate', options.evaluations, progress) as done,
         compilation() as compiled,
     ):
         problem = Problem(
@@ -98,9 +97,7 @@ def calibrate(
             settle=settle,
             prior=None if given_before is None else given_before.carried,
         )
-        problem, target, chains, remark = sampled(
-            problem, options, near, harmless(progress if callable(progress) else bar)
-        )
+        problem, target, chains, remark = sampled(problem, options, near, done)
     seconds = time.perf_counter() - started - sum(compiled)
     if not chains.annealed:
         raise InputError(

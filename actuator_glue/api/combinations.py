@@ -16,7 +16,7 @@ from actuator_glue.api.calibration_options import CalibrationChanges, Calibratio
 from actuator_glue.api.calibration_parts import marginals, marginals_frame, marginals_json
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.api.given import Records, records_given
-from actuator_glue.api.matlab import Exported, TransferFunction, delay_of, write_mat
+from actuator_glue.api.matlab import TransferFunction, delay_of, write_mat
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
 from actuator_glue.diagnosis.verdict.residual_structure import DIAGNOSE
@@ -104,9 +104,9 @@ class Combinations(Result, CombinationsData):
         Raises:
             InputError: the file cannot be written.
         """
-        units = [p.unit for p in self.combinations.values()]
-        of = Exported(self.posterior, tuple(self.combinations), units, self.effects, self.problems)
-        return write_mat(path, of, [_transfer(self)])
+        units = {name: p.unit for name, p in self.combinations.items()}
+        models, effects, problems = [_transfer(self)], self.effects, self.problems
+        return write_mat(path, self.posterior, units, models, effects=effects, problems=problems)
 
     def plot(self) -> Figure:
         """Return a figure of the distribution of each combination, and of each pair."""

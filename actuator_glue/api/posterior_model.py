@@ -17,7 +17,7 @@ from actuator_glue.api.ensemble import GivenCommand, commanded, simulated
 from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
-from actuator_glue.api.matlab import Exported, under, write_mat
+from actuator_glue.api.matlab import under, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
 from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
@@ -227,5 +227,7 @@ class PosteriorModel(Result):
         of = self.drawn()
         several: Any = of.stiffness if stiffness is None else stiffness
         several = np.ravel(np.asarray(several, dtype=object))
-        what = Exported(of.draws, of.names, of.units, of.structure.effects, of.problems)
-        return write_mat(path, what, [under(what, check_stiffness(k)) for k in several])
+        models = [under(of.draws, of.names, check_stiffness(k)) for k in several]
+        units = dict(zip(of.names, of.units, strict=True))
+        effects, problems = of.structure.effects, of.problems
+        return write_mat(path, of.draws, units, models, effects=effects, problems=problems)
