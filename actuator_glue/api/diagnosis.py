@@ -400,7 +400,7 @@ def diagnose(
             seed=options.seed,
             each=pool.map,
             progress=harmless(progress) if callable(progress) else lambda stage, share: bar(share),
-            first_look=harmless(first_look),
+            first_look=None if first_look is None else harmless(first_look),
             settings=Thresholds(
                 false_alarms=options.false_alarms,
                 use_force=options.use_force,

@@ -24,6 +24,7 @@ from actuator_glue.api.partition_given import partition_given
 from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.api.stability_data import AtFrequency, DelayMargin
+from actuator_glue.api.tracking import FREQUENCIES
 from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
 from actuator_glue.given import number, of_kind, whole
@@ -39,7 +40,6 @@ from actuator_glue.hybrid.virtual import DIVERGED, VirtualTest
 from actuator_glue.io.ground_motion import read_ground_motion
 from actuator_glue.records import Array
 
-FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 DRAWS = 1000
 # Logarithm of a growth with which linear loops diverge within a record: from a fifth of the
 # reference's peak to five times it.

@@ -103,9 +103,10 @@ def run(args: argparse.Namespace) -> int:
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.api.compensation import HEADER as COMPARED
     from actuator_glue.api.compensation import compare_compensators
-    from actuator_glue.api.rths import FREQUENCIES, rths
+    from actuator_glue.api.rths import rths
     from actuator_glue.api.stability_data import limit_given
     from actuator_glue.api.stability_report import HEADER, lines, rows
+    from actuator_glue.api.tracking import FREQUENCIES
     from actuator_glue.io.ground_motion import read_ground_motion
 
     if args.limit is not None:
