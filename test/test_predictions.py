@@ -129,7 +129,7 @@ def test_what_was_measured_lies_on_the_response(posterior: ag.Calibration, hold:
     shape = ag.Command('noise', rate=RATE, duration=40.0, high=15.0)
     record = ag.simulate(shape, stiffness=STIFF, hold=hold, seed=(11, 9))
     of = posterior.drawn()
-    found = recorded_response(of.draws[::100], of.names, of.structure, record)
+    found = recorded_response(of.some(100), record)
     seen = found.measured
     assert seen is not None and len(seen.frequency) > 20
     assert seen.frequency[0] < 1.0 and 12.0 < seen.frequency[-1] < 17.0

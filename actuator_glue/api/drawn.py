@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -42,6 +42,10 @@ class Drawn:
     records: tuple[Record, ...]
     stiffness: tuple[float, ...]
     problems: tuple[str, ...]
+
+    def some(self, count: int) -> Drawn:
+        """Return so many of the draws, evenly spread over them."""
+        return replace(self, draws=evenly(self.draws, count))
 
 
 def evenly(draws: NDArray[Kind], count: int = SIZE) -> NDArray[Kind]:

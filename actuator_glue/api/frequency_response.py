@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.errors import InputError
 from actuator_glue.given import vector
 from actuator_glue.hybrid.actuator import actuator, table_of
@@ -73,18 +73,12 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    draws: Array,
-    names: Sequence[str],
-    structure: Structure,
-    stiffness: float,
-    frequencies: ArrayLike | None = None,
+    of: Drawn, stiffness: float, frequencies: ArrayLike | None = None
 ) -> FrequencyResponse:
     """Return the continuous response x/u of draws.
 
     Args:
-        draws: shape (m, p), SI units.
-        names: parameter of each column; those of a likelihood are passed over.
-        structure: the model.
+        of: the draws.
         stiffness: of the specimen [N/m].
         frequencies: shape (f,) [Hz]; None for 0.1 to 30 Hz.
 
@@ -96,24 +90,17 @@ def frequency_response(
     if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
         raise InputError('frequencies must be positive numbers [Hz]')
     hertz = np.sort(hertz)
-    gain, phase = _response(draws, names, structure, stiffness, hertz)
-    return _limits(gain, phase, hertz, structure, stiffness)
+    gain, phase = _response(of, stiffness, hertz)
+    return _limits(gain, phase, hertz, of.structure, stiffness)
 
 
-def recorded_response(
-    draws: Array,
-    names: Sequence[str],
-    structure: Structure,
-    record: Record,
-) -> FrequencyResponse:
+def recorded_response(of: Drawn, record: Record) -> FrequencyResponse:
     """Return the response that draws expect between the samples of a record, and the record's own.
 
     A command that is held from sample to sample lags by half a period more: that is in both.
 
     Args:
-        draws: shape (m, p), SI units.
-        names: parameter of each column; those of a likelihood are passed over.
-        structure: the model.
+        of: the draws.
         record: the test; its stiffness must be known.
 
     Raises:
@@ -121,14 +108,14 @@ def recorded_response(
     """
     measured = measured_response(record)
     highest = min(1.5 * float(measured.frequency[-1]), 0.45 * record.rate)
-    hertz = np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2])
+    hertz = np.sort(np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2]))
     stiffness = record.known_stiffness()
 
     def expected(at: Array) -> tuple[Array, Array]:
         held = np.sinc(at * record.period) ** (2 if record.hold == 'linear' else 1)
         if record.hold == 'zoh':
             held = held * np.exp(-1j * np.pi * at * record.period)
-        gain, phase = _response(draws, names, structure, stiffness, at)
+        gain, phase = _response(of, stiffness, at)
         # A hold turns by less than half a turn at every frequency: its angle is all of it.
         return gain * np.abs(held), phase + np.angle(held)
 
@@ -137,17 +124,14 @@ def recorded_response(
     turns = np.rint((lowest - measured.phase[0]) / 360.0)
     measured = measured._replace(phase=measured.phase + 360.0 * turns)
     gain, phase = expected(hertz)
-    return _limits(gain, phase, hertz, structure, stiffness, measured)
+    return _limits(gain, phase, hertz, of.structure, stiffness, measured)
 
 
-def _response(
-    draws: Array, names: Sequence[str], structure: Structure, stiffness: float, hertz: Array
-) -> tuple[Array, Array]:
+def _response(of: Drawn, stiffness: float, hertz: Array) -> tuple[Array, Array]:
     """Return gain and phase [rad] of what the recording transducer shows, (m, f) each."""
-    table = table_of(draws, names, structure)
-    linear = actuator(
-        table, structure.names, structure.entries, np.full(len(table), float(stiffness))
-    )
+    table, model = table_of(of.draws, of.names, of.structure), of.structure
+    k = np.full(len(table), float(stiffness))
+    linear = actuator(table, model.names, model.entries, k)
     w = 2.0 * np.pi * hertz
     seen = np.broadcast_to(linear.shown, linear.system.C.shape)
     recorded = linear.system._replace(C=seen)

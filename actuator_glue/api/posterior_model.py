@@ -96,11 +96,8 @@ class PosteriorModel(Result):
         Raises:
             InputError: an impossible stiffness or impossible frequencies.
         """
-        of = self.drawn()
         k = check_stiffness(stiffness)
-        return response.frequency_response(
-            evenly(of.draws, 1000), of.names, of.structure, k, frequencies
-        )
+        return response.frequency_response(self.drawn().some(1000), k, frequencies)
 
     def plot_bode(
         self, record: OneRecord | None = None, *, stiffness: float | None = None
@@ -115,19 +112,18 @@ class PosteriorModel(Result):
         Raises:
             InputError: a record of which nothing can be told, or no stiffness.
         """
-        of = self.drawn()
-        draws = evenly(of.draws, 1000)
+        of = self.drawn().some(1000)
         shown: list[tuple[str, FrequencyResponse]] = []
         if stiffness is None:
             given = of.records if record is None else (one_record_given(record),)
             called = source_names(test.source for test in (*of.records, *given))
             for test in given[:_SIDE_BY_SIDE]:
-                found = response.recorded_response(draws, of.names, of.structure, test)
+                found = response.recorded_response(of, test)
                 shown.append((response.title(found, called[test.source]), found))
         if not shown:
             known = of.stiffness if stiffness is None else (check_stiffness(stiffness),)
             for k in known[:_SIDE_BY_SIDE]:
-                found = response.frequency_response(draws, of.names, of.structure, k)
+                found = response.frequency_response(of, k)
                 shown.append((response.title(found), found))
         if not shown:
             raise InputError('give a record, or a specimen stiffness [N/m] as stiffness=0.0')
