@@ -67,7 +67,7 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
             make_room(out)
         write(out)
     except (InputError, OSError) as error:
-        print(f'actuator-glue: {_told(str(error))}', file=sys.stderr)
+        fault(str(error))
         return 2
     except Exception as error:
         note(
@@ -75,6 +75,11 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
             'actuator-glue, please report it. The answer stands'
         )
     return 0
+
+
+def fault(line: str) -> None:
+    """Print what is wrong on standard error."""
+    print(f'actuator-glue: {_told(line)}', file=sys.stderr)
 
 
 def note(line: str) -> None:

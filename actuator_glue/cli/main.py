@@ -17,10 +17,11 @@ from pathlib import Path
 
 from actuator_glue import __version__, cli
 from actuator_glue.arguments import claim_outputs
+from actuator_glue.cli._output import fault
 from actuator_glue.cli._parser import Parser, examples
 from actuator_glue.cli._standard_streams import StandardStream, standard_streams
 from actuator_glue.errors import InputError
-from actuator_glue.motion import METRES, speak, spoken
+from actuator_glue.motion import METRES, speak
 
 
 def commands() -> dict[str, Path]:
@@ -67,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _run(list(sys.argv[1:] if argv is None else argv), out)
         out.flush()
         if out.fault:
-            print(f'actuator-glue: standard output: {out.fault}', file=sys.stderr)
+            fault(f'standard output: {out.fault}')
             return 2
     return code
 
@@ -118,7 +119,7 @@ def _fail(message: str, code: int, debug: bool) -> int:
     """Tell the exception that is being handled, or raise it again where it is looked for."""
     if debug:
         raise
-    print(f'actuator-glue: {spoken(message)}', file=sys.stderr)
+    fault(message)
     return code
 
 
