@@ -10,6 +10,7 @@ import pytest
 import scipy
 
 import actuator_glue as ag
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frequency_response import measured_response, recorded_response
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure
@@ -148,7 +149,9 @@ def test_what_was_measured_of_a_late_actuator_has_the_turns_of_the_model() -> No
     shape = ag.Command('noise', rate=RATE, duration=20.0, low=8.0, high=14.0)
     record = ag.simulate(shape, stiffness=STIFF, effects=theta, seed=(11, 9))
     draws = np.tile([*TABLE_2, 0.03], (3, 1))
-    found = recorded_response(draws, Structure(['delay']).names, Structure(['delay']), record)
+    late = Structure(['delay'])
+    of = Drawn(draws, late.names, (), draws[0], late, None, (), (), ())
+    found = recorded_response(of, record)
     seen = found.measured
     assert seen is not None and seen.frequency[0] > 6.0
     assert found.phase.median[0] < -180.0

@@ -164,12 +164,12 @@ def _refuse_idle(args: argparse.Namespace) -> None:
             ['--duration', '--rate'],
             '--plant problem-r, whose command is that of the paper',
         )
-        if args.shape != 'sweep':
-            raise InputError(f'--command {args.shape} does nothing with {by}; take it out')
-        if (args.force_noise_n, args.bits, args.hold) != (None, None, 'zoh'):
-            raise InputError(
-                '--force-noise-n, --bits and --hold linear do nothing with --plant problem-r'
-            )
+        usual = (('--command', args.shape, 'sweep'), ('--hold', args.hold, 'zoh'))
+        for option, value, only in usual:
+            if value != only:
+                raise InputError(f'{option} {value} does nothing with {by}; take it out')
+        if (args.force_noise_n, args.bits) != (None, None):
+            raise InputError('--force-noise-n and --bits do nothing with --plant problem-r')
     for option in _OF_COMMANDS.split():
         if given(args, option) and option not in used:
             raise InputError(f'{option} does nothing with {by}; take it out')

@@ -85,7 +85,7 @@ def test_a_recorded_command_and_an_undeclared_effect(run, tmp_path: Path, short_
         (('--amplitude-mm', '-1'), 'amplitude'),
         (('--command', 'nothing.csv'), 'nor a file'),
         (('--plant', 'problem-r', '--stiffness', '5'), 'problem-r'),
-        (('--plant', 'problem-r', '--hold', 'linear'), '--hold linear do nothing'),
+        (('--plant', 'problem-r', '--hold', 'linear'), '--hold linear does nothing'),
         (('--plant', 'problem-r', '--rate', '0'), 'rate'),
         (('--plant', 'problem-r', '--duration', '0'), 'no full sample'),
         (('--plant', 'benchmark', '--stiffness', '5'), 'own specimen'),
