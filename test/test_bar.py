@@ -78,8 +78,8 @@ def test_a_terminal_is_asked(
 
     usual = rich.progress.Progress
 
-    def progress(**options: Any) -> Any:
-        made.append(usual(**options))
+    def progress(*columns: Any, **options: Any) -> Any:
+        made.append(usual(*columns, **options))
         return made[-1]
 
     monkeypatch.setattr(rich.progress, 'Progress', progress)

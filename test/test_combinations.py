@@ -11,6 +11,7 @@ import pytest
 import scipy
 
 import actuator_glue as ag
+from actuator_glue.api.calibration_parts import marginals
 from actuator_glue.api.combinations import Combinations
 from actuator_glue.api.combinations_data import COMBINATIONS
 from actuator_glue.cli.main import main
@@ -63,6 +64,24 @@ def test_the_combinations_are_those_of_the_actuator(stiffness: float) -> None:
     assert found.problems == ()
     assert 'it predicts no other stiffness' in found.notes[0]
     assert found.sources[0].stiffness_n_per_m is None
+
+
+def test_errors_may_be_correlated() -> None:
+    """The parameter of their likelihood is told as of every calibration."""
+    found = ag.combinations(simulated(250e3), likelihood='ar1', **SHORT)
+    assert list(found.combinations) == [*COMBINATIONS, 'phi']
+    assert found.combinations['phi'].unit == '1' and found.combinations['phi'].bounds[1] < 1.1
+    assert len(found.residuals[0]) == len(found.records[0])
+
+
+def test_an_effect_that_stays_as_wide_as_its_prior_is_told() -> None:
+    """Combinations have no bounds that they could fill."""
+    rng = np.random.default_rng(4)
+    draws = rng.uniform(size=(400, 3, 2)) * [2.0, 1.0]
+    units, bounds = {'b': '1/s^2', 'gain': '1'}, [(0.0, np.inf), (0.0, 1.0)]
+    told = marginals(draws, draws[0, 0], units, bounds)
+    assert [p.prior_dominated for p in told.values()] == [False, True]
+    assert told['gain'].mean == pytest.approx(0.5, abs=0.05) and told['gain'].unit == '1'
 
 
 @pytest.mark.usefixtures('undrawn')

@@ -10,6 +10,7 @@ import pytest
 import scipy
 
 import actuator_glue as ag
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frequency_response import measured_response, recorded_response
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure
@@ -64,6 +65,12 @@ def test_a_prediction_covers_a_test_that_nobody_fitted(
     table = found.to_dataframe()
     assert table.index[1] == 1 / RATE and list(table['upper']) == list(found.upper)
     assert 'measured inside' in repr(found) and 'array(' not in repr(found)
+    # Under another stiffness nothing was measured; where a record leaves its own open, it is this.
+    other = posterior.predict(unseen, k + 50e3)
+    assert other.measured is None and 'measured inside' not in repr(other)
+    left_open = replace(unseen, stiffness=None)
+    for record in (unseen, left_open):
+        assert posterior.predict(record, k).inside == found.inside
 
 
 def test_a_shape_is_a_command(posterior: ag.Calibration, tmp_path: Path) -> None:
@@ -123,7 +130,7 @@ def test_what_was_measured_lies_on_the_response(posterior: ag.Calibration, hold:
     shape = ag.Command('noise', rate=RATE, duration=40.0, high=15.0)
     record = ag.simulate(shape, stiffness=STIFF, hold=hold, seed=(11, 9))
     of = posterior.drawn()
-    found = recorded_response(of.draws[::100], of.names, of.structure, record)
+    found = recorded_response(of.some(100), record)
     seen = found.measured
     assert seen is not None and len(seen.frequency) > 20
     assert seen.frequency[0] < 1.0 and 12.0 < seen.frequency[-1] < 17.0
@@ -142,7 +149,9 @@ def test_what_was_measured_of_a_late_actuator_has_the_turns_of_the_model() -> No
     shape = ag.Command('noise', rate=RATE, duration=20.0, low=8.0, high=14.0)
     record = ag.simulate(shape, stiffness=STIFF, effects=theta, seed=(11, 9))
     draws = np.tile([*TABLE_2, 0.03], (3, 1))
-    found = recorded_response(draws, Structure(['delay']).names, Structure(['delay']), record)
+    late = Structure(['delay'])
+    of = Drawn(draws, late.names, (), draws[0], late, None, (), (), ())
+    found = recorded_response(of, record)
     seen = found.measured
     assert seen is not None and seen.frequency[0] > 6.0
     assert found.phase.median[0] < -180.0

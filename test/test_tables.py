@@ -1,8 +1,7 @@
 """Results as tables of pandas: parameters, effects, windows, with the numbers that JSON has."""
 
-import builtins
 import math
-from typing import Any
+import sys
 
 import numpy as np
 import pytest
@@ -94,13 +93,6 @@ def test_what_to_install_is_told(
     posterior: ag.Calibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without pandas: one line that names the extra."""
-    usual = builtins.__import__
-
-    def without(name: str, *rest: Any) -> Any:
-        if name == 'pandas':
-            raise ImportError(name)
-        return usual(name, *rest)
-
-    monkeypatch.setattr(builtins, '__import__', without)
+    monkeypatch.setitem(sys.modules, 'pandas', None)
     with pytest.raises(ag.InputError, match=r"pip install 'actuator_glue\[lab\]'"):
         posterior.to_dataframe()

@@ -16,6 +16,7 @@ from typing import Any
 from actuator_glue.api.callbacks import harmless
 
 _EVERY = 0.2  # s between two looks
+_AN_HOUR = 3600.0  # s
 
 
 def in_notebook() -> bool:
@@ -49,11 +50,33 @@ def shown(
         finally:
             line.clear()
     else:
-        from rich.progress import Progress
+        with progress(title, total) as done:
+            yield done
 
-        with Progress(transient=True) as bar:
-            task = bar.add_task(title, total=total)
-            yield lambda amount: bar.update(task, completed=amount)
+
+@contextmanager
+def progress(title: str, total: float) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar with time left on standard error; yields `done(amount so far)`.
+
+    Nothing is drawn where standard error is no terminal.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    bar = Progress(
+        TextColumn('{task.description}'),
+        BarColumn(),
+        TextColumn('{task.percentage:>3.0f} %'),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+        speed_estimate_period=_AN_HOUR,  # shares are of the whole, so the time left is, too
+    )
+    with bar:
+        task = bar.add_task(title, total=total)
+        yield lambda amount: bar.update(task, completed=amount)
 
 
 class _Line:

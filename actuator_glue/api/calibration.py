@@ -6,17 +6,15 @@ import time
 from collections.abc import Callable
 from typing import Unpack
 
-import numpy as np
-
 from actuator_glue.api import judgement
 from actuator_glue.api.bar import shown
-from actuator_glue.api.calibration_error import fit_error, force_errors, left_over
+from actuator_glue.api.calibration_error import fit_error, force_errors, residuals
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
-from actuator_glue.api.calibration_parts import CalibratedRecord, Marginal, RecordForce
+from actuator_glue.api.calibration_parts import CalibratedRecord, RecordForce, marginals
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.calibration_shaping import sampled
-from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.compilation import compilation
+from actuator_glue.api.ensemble import residual_of
 from actuator_glue.api.given import Records, Stiffness, records_given
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.prior import given_prior
@@ -30,10 +28,8 @@ from actuator_glue.hygiene.repeats import refuse_known, sketch
 from actuator_glue.hygiene.suspicions import suspicions
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.inference.at_bound import pressed
-from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.least_squares.data import SETTLE
-from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem
 from actuator_glue.inference.prior_conflict import conflict
 from actuator_glue.model.structure import Structure
@@ -90,7 +86,7 @@ def calibrate(
         refuse_known(tests, given_before.sketches, given_before.source)
     started = time.perf_counter()
     with (
-        shown('calibrate', options.evaluations, False if callable(progress) else progress) as bar,
+        shown('calibrate', options.evaluations, progress) as done,
         compilation() as compiled,
     ):
         problem = Problem(
@@ -101,17 +97,18 @@ def calibrate(
             settle=settle,
             prior=None if given_before is None else given_before.carried,
         )
-        problem, target, chains, remark = sampled(
-            problem, options, near, harmless(progress if callable(progress) else bar)
-        )
+        problem, target, chains, remark = sampled(problem, options, near, done)
     seconds = time.perf_counter() - started - sum(compiled)
     if not chains.annealed:
         raise InputError(
             f'{options.evaluations} evaluations ended on the way from the prior: no posterior was '
             'reached; give more --evaluations'
         )
-    fit = fit_error(model, chains.best, cleaned, initial, settle)
-    parameters = _marginals(model, chains)
+    structure = Structure(model.effects)
+    errors = residuals(structure, chains.best, cleaned, initial, settle)
+    fit = fit_error(cleaned, errors)
+    units = dict(zip(model.names, model.units, strict=True))
+    parameters = marginals(chains.kept, chains.best, units, list(zip(*model.bounds, strict=True)))
     at_bound = pressed(chains.posterior(), model.names, *model.bounds)
     prior = None
     if target.prior is not None and given_before is not None:
@@ -121,7 +118,6 @@ def calibrate(
             conflict(target.prior, chains.posterior()).p_value,
         )
     converged = judgement.converged(parameters)
-    structure = Structure(model.effects)
     best = chains.best[: len(structure.names)]
     left = residual_structure(cleaned, initial, settle, structure, best)
     doubtful = suspicions(tests)
@@ -130,7 +126,7 @@ def calibrate(
     called = source_names(r.source for r in cleaned)
     forces: tuple[RecordForce, ...] = ()
     if options.use_force:
-        forces = force_errors(model, chains.best, cleaned, initial, settle)
+        forces = force_errors(structure, chains.best, cleaned, initial, settle)
     return Calibration(
         parameters=parameters,
         draws=chains.kept,
@@ -165,7 +161,7 @@ def calibrate(
         prior=prior,
         records=tuple(cleaned),
         tracking=records_tracking(chains.posterior(), model.names, structure, cleaned),
-        residual=left_over(model, chains.best, cleaned, initial, settle),
+        residual=residual_of(errors, len(structure.names)),
         sketches=tuple(sketch(r) for r in tests),
     )
 
@@ -183,28 +179,3 @@ def sampled_model(options: CalibrationOptions) -> ModelChoice:
             raise InputError(f'{parameter.name} cannot be negative; its bounds start at {least:g}')
     model = choose_model(options.effects, options.bounds)
     return model.with_autocorrelation() if options.likelihood == 'ar1' else model
-
-
-def _marginals(model: ModelChoice, chains: Chains) -> dict[str, Marginal]:
-    import arviz as az
-
-    lower, upper = model.bounds
-    found = moments(chains.posterior(), lower, upper)
-    # arviz wants (chain, draw, parameter).
-    data = az.convert_to_dataset({'theta': np.swapaxes(chains.kept, 0, 1)})
-    rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
-    return {
-        name: Marginal(
-            mean=float(found.mean[i]),
-            stddev=float(found.stddev[i]),
-            skewness=float(found.skewness[i]),
-            cov=float(found.cov[i]),
-            rhat=float(rhat[i]),
-            ess=float(ess[i]),
-            best=float(chains.best[i]),
-            unit=unit,
-            bounds=(float(lower[i]), float(upper[i])),
-            prior_dominated=bool(found.prior_dominated[i]),
-        )
-        for i, (name, unit) in enumerate(zip(model.names, model.units, strict=True))
-    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +15,11 @@ from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.inference.prior_use import PriorUse
+from actuator_glue.model.exact import Initial
 from actuator_glue.records import Array, Record
 
-# Normal components of the prior that a calibration makes, at most.
-COMPONENTS = 4
+# Normal components of a prior, at most.
+_COMPONENTS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -71,7 +73,7 @@ class CalibrationData:
     likelihood: str
     shaping_factor: float | None
     seed: int
-    initial: str
+    initial: Initial
     settle: float
     evaluations: int
     seconds: float
@@ -113,12 +115,22 @@ class CalibrationData:
 
     def carried(self) -> Carried:
         """Return the draws as a prior for later tests of the same actuator."""
-        from actuator_glue.inference.mixture_density import components
+        return as_prior(self.names, self.posterior)
 
-        found = Carried.thinned(self.names, self.posterior)
-        positive = (found.draws > 0.0).all(axis=0)
-        logs = np.where(positive, np.log(np.where(positive, found.draws, 1.0)), found.draws)
-        return replace(found, components=components(logs, COMPONENTS))
+
+def as_prior(names: Sequence[str], draws: Array) -> Carried:
+    """Return draws (m, p) of parameters as a prior, normal in logarithms where all are positive.
+
+    Args:
+        names: of the columns.
+        draws: SI units.
+    """
+    from actuator_glue.inference.mixture_density import components
+
+    found = Carried.thinned(names, draws)
+    positive = (found.draws > 0.0).all(axis=0)
+    logs = np.where(positive, np.log(np.where(positive, found.draws, 1.0)), found.draws)
+    return replace(found, components=components(logs, _COMPONENTS))
 
 
 def _check_array(

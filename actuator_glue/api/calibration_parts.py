@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_glue.api.frame import frame
+from actuator_glue.inference.moments import moments
 from actuator_glue.json_value import json_value
 from actuator_glue.model.force_errors import transducer
 from actuator_glue.motion import METRES, spoken
@@ -46,6 +47,41 @@ class Marginal:
     unit: str
     bounds: tuple[float, float]
     prior_dominated: bool
+
+
+def marginals(
+    draws: Array, best: Array, units: Mapping[str, str], bounds: Sequence[tuple[float, float]]
+) -> dict[str, Marginal]:
+    """Return the posterior of each parameter.
+
+    Args:
+        draws: of all chains, shape (steps, chains, p).
+        best: the draw of the highest likelihood, shape (p,).
+        units: unit of each parameter by name, in the order of the draws.
+        bounds: of their uniform priors; infinite where there is none.
+    """
+    import arviz as az
+
+    lower, upper = np.transpose(bounds)
+    told = moments(draws.reshape(-1, draws.shape[-1]), lower, upper)
+    # arviz wants (chain, draw, parameter).
+    data = az.convert_to_dataset({'theta': np.swapaxes(draws, 0, 1)})
+    rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
+    return {
+        name: Marginal(
+            mean=float(told.mean[i]),
+            stddev=float(told.stddev[i]),
+            skewness=float(told.skewness[i]),
+            cov=float(told.cov[i]),
+            rhat=float(rhat[i]),
+            ess=float(ess[i]),
+            best=float(best[i]),
+            unit=unit,
+            bounds=(float(lower[i]), float(upper[i])),
+            prior_dominated=bool(told.prior_dominated[i]),
+        )
+        for i, (name, unit) in enumerate(units.items())
+    }
 
 
 def marginals_json(parameters: Mapping[str, Marginal], draws: Array) -> dict[str, Any]:

@@ -9,13 +9,15 @@ import numpy as np
 
 from actuator_glue.api import tracking
 from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.calibration_error import best_residuals
 from actuator_glue.api.calibration_parts import FitError, Marginal
-from actuator_glue.api.ensemble import evenly, simulated
+from actuator_glue.api.combinations_data import CombinationsData
+from actuator_glue.api.drawn import evenly
+from actuator_glue.api.ensemble import simulated
 from actuator_glue.diagnosis.verdict.residual_structure import ResidualStructure
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.convergence import APART
 from actuator_glue.inference.predictive import fit_residual, total_band
-from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record, source_name, source_names
 from actuator_glue.report import html
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEVEL = 0.95
-_PANELS = 4  # records in the first picture
+PANELS = 4  # records in the first picture
 HEADER = ('parameter', 'unit', 'mean', 'sd', 'skew', 'COV', 'R-hat', 'ESS')
 
 
@@ -45,9 +47,8 @@ def bands_figure(found: CalibrationData, record: Record) -> tuple[Figure, float]
     """
     structure = Structure(found.effects)
     count = len(structure.names)
-    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
-    moved = simulated(evenly(found.posterior), found.names, structure, record, initial)
-    best = structure.simulate(found.best[:count], record, initial=initial)
+    moved = simulated(evenly(found.posterior), found.names, structure, record, found.initial)
+    best = structure.simulate(found.best[:count], record, initial=found.initial)
     residual = fit_residual(record.measured - best, parameters=count)
     total = total_band(np.random.default_rng(0), moved, residual, (LEVEL,))
     inside = (record.measured >= total.lower[0]) & (record.measured <= total.upper[0])
@@ -71,9 +72,9 @@ def posterior(found: CalibrationData) -> Figure:
     return posterior_figure(found.posterior, found.names, units)
 
 
-def moment_rows(found: CalibrationData) -> list[tuple[str, ...]]:
-    """Return a row of text for each parameter, under HEADER."""
-    return [
+def moments(found: CalibrationData) -> html.Table:
+    """Return the table of moments."""
+    rows = [
         (
             name,
             p.unit,
@@ -86,16 +87,13 @@ def moment_rows(found: CalibrationData) -> list[tuple[str, ...]]:
         )
         for name, p in found.parameters.items()
     ]
-
-
-def moments_title(found: CalibrationData) -> str:
-    """Return the title of the table of moments."""
     g = found.shaping_factor
     how = f'G = {g:.6g}' if g is not None else found.likelihood
     if found.automatic_shaping:
         how += ' (automatic)'
     force = ' and force' if found.force else ''
-    return f'Posterior moments, {len(found.sources)} record(s){force}, {how}'
+    title = f'Posterior moments, {len(found.sources)} record(s){force}, {how}'
+    return html.Table(HEADER, rows, title)
 
 
 def error_line(error: FitError, left: ResidualStructure | None) -> str:
@@ -204,15 +202,37 @@ def errors(error: FitError, left: ResidualStructure | None) -> html.Table:
 
 def _parameters(found: CalibrationData, name: Callable[[str], str]) -> html.Table:
     meanings = {p.name: p.meaning for p in Structure(found.effects).parameters}
-    ends = np.quantile(found.posterior, (0.025, 0.975), axis=0).T
+    known = '' if found.prior is None else f', and what {source_name(found.prior.source)} knew'
+    return before_after(found.parameters, found.posterior, meanings, known, name)
+
+
+def before_after(
+    parameters: Mapping[str, Marginal],
+    draws: Array,
+    meanings: Mapping[str, str],
+    known: str = '',
+    name: Callable[[str], str] = str,
+) -> html.Table:
+    """Return what was known of each parameter before, and what is known by its draws.
+
+    Args:
+        parameters: posterior of each.
+        draws: shape (m, p), in their order.
+        meanings: what they are.
+        known: what else than bounds was known.
+        name: what a parameter is called.
+    """
+    ends = np.quantile(draws, (0.025, 0.975), axis=0).T
     rows = []
-    for (n, p), (low, high) in zip(found.parameters.items(), ends, strict=True):
-        factor, unit = said_in(p.unit, *p.bounds)
-        before = f'{plain(factor * p.bounds[0])} to {plain(factor * p.bounds[1])} {unit}'.rstrip()
+    for (n, p), (low, high) in zip(parameters.items(), ends, strict=True):
+        before = 'not negative'
+        if np.isfinite(p.bounds[1]):
+            factor, unit = said_in(p.unit, *p.bounds)
+            limits = (plain(factor * bound) for bound in p.bounds)
+            before = f'{" to ".join(limits)} {unit}'.rstrip()
         after = spread(p.mean, float(low), float(high), p.unit)
         after += ', little more than its prior' if p.prior_dominated else ''
         rows.append([name(n), meanings.get(n, ''), before, after])
-    known = '' if found.prior is None else f', and what {source_name(found.prior.source)} knew'
     header = ['parameter', 'what it is', 'before', 'after']
     caption = f'Parameters before (bounds{known}) and after (means, 95 % intervals).'
     return html.Table(header, rows, caption, prose=True)
@@ -263,27 +283,29 @@ def next_command(found: CalibrationData) -> str:
 
 
 def _left(found: CalibrationData) -> list[Left]:
-    structure = Structure(found.effects)
-    best = found.best[: len(structure.names)]
-    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
     noise = None if found.structure is None else found.structure.noise_m
     out = []
-    for record in found.records[:_PANELS]:
-        first = round(found.settle / record.period)
-        error = record.measured - structure.simulate(best, record, initial=initial)
+    for record, error in zip(found.records, best_residuals(found, PANELS), strict=False):
         k = f'k = {record.known_stiffness() / 1e3:g} kN/m'
         title = f'{_called(found, record) or "record"}: {k}'
-        out.append(Left(title, record.time[first:], error[first:], noise))
+        out.append(Left(title, record.time[-len(error) :], error, noise))
     return out
 
 
 def brief(found: CalibrationData) -> list[html.Block]:
     """Return problems, moments, error and notes."""
-    blocks: list[html.Block] = [html.Note(line) for line in found.problems]
-    blocks.append(html.Table(HEADER, moment_rows(found), moments_title(found)))
-    blocks.append(html.Text(error_line(found.error, found.structure)))
-    blocks += tracking.tables(found.tracking)
-    return [*blocks, *(html.Note(line) for line in found.notes)]
+    return in_brief(found, moments(found))
+
+
+def in_brief(found: CalibrationData | CombinationsData, table: html.Table) -> list[html.Block]:
+    """Return problems, the table of what is known, error, tracking and notes."""
+    return [
+        *map(html.Note, found.problems),
+        table,
+        html.Text(error_line(found.error, found.structure)),
+        *tracking.tables(found.tracking),
+        *map(html.Note, found.notes),
+    ]
 
 
 def page(found: CalibrationData, hybrid: str = '', next_command: str = '') -> html.Page:
@@ -298,18 +320,8 @@ def page(found: CalibrationData, hybrid: str = '', next_command: str = '') -> ht
     picture = html.Picture.of(
         posterior(found), 'Distribution of each parameter, and of each pair.'
     )
-    moments: list[html.Block] = [
-        html.Table(HEADER, moment_rows(found), moments_title(found)),
-        picture,
-        *(html.Note(line) for line in found.notes),
-    ]
-    sections = [
-        html.Section('The answer', first.blocks(headline=False)),
-        html.Section('Posterior', moments),
-    ]
-    if found.tracking:
-        tables = tracking.tables(found.tracking)
-        sections.append(html.Section('How the actuator follows its command', tables))
+    known: list[html.Block] = [moments(found), picture, *map(html.Note, found.notes)]
+    sections = first_sections(first, known, found.tracking)
     if found.records:
         pictures = []
         left = {e.source: e.rms_m for e in found.error.records}
@@ -325,3 +337,17 @@ def page(found: CalibrationData, hybrid: str = '', next_command: str = '') -> ht
         sections.append(html.Section('Bands over the records', [*drawn, *pictures]))
     made = f'{found.evaluations} evaluations, seed {found.seed}'
     return html.Page('Calibration', first.verdict[0], sections, made)
+
+
+def first_sections(
+    first: FirstPage, known: Sequence[html.Block], tracked: Sequence[tracking.RecordTracking]
+) -> list[html.Section]:
+    """Return the sections of a report: the answer, what is known, how the command is followed."""
+    sections = [
+        html.Section('The answer', first.blocks(headline=False)),
+        html.Section('Posterior', known),
+    ]
+    if tracked:
+        tables = tracking.tables(tracked)
+        sections.append(html.Section('How the actuator follows its command', tables))
+    return sections

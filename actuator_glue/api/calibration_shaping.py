@@ -32,7 +32,7 @@ def sampled(
     problem: Problem,
     options: CalibrationOptions,
     near: Array,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None],
 ) -> tuple[Problem, Target, Chains, tuple[str, ...]]:
     """Return a problem with its shaping factors, its posterior, and what automatic ones say.
 
@@ -65,7 +65,7 @@ def _run(
     problem: Problem,
     options: CalibrationOptions,
     before: Chains | None,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None],
 ) -> tuple[Target, Chains]:
     """Return the target and its draws, perhaps from where an earlier posterior stands."""
     target, archive = problem.target(), None
@@ -80,7 +80,7 @@ def _run(
         options.evaluations,
         settings=published,
         archive=archive,
-        progress=None if progress is None else lambda made, _: progress(made),
+        progress=lambda made, _: progress(made),
     )
     return target, chains
 

@@ -4,34 +4,24 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import ParamSpec, overload
+from typing import ParamSpec
 
 P = ParamSpec('P')
 
 
-@overload
-def harmless(told: Callable[P, object]) -> Callable[P, None]: ...
-
-
-@overload
-def harmless(told: Callable[P, object] | None) -> Callable[P, None] | None: ...
-
-
-def harmless(told: Callable[P, object] | None) -> Callable[P, None] | None:
-    """Return a callback whose first failure is a warning and its last call; None for None.
+def harmless(told: Callable[P, object]) -> Callable[P, None]:
+    """Return a callback whose first failure is a warning and its last call.
 
     What is not an `Exception`, as the interrupt of a keyboard, ends the work as ever.
     """
-    if told is None:
-        return None
-    call, failed = told, False
+    failed = False
 
     def tell(*args: P.args, **kwargs: P.kwargs) -> None:
         nonlocal failed
         if failed:
             return
         try:
-            call(*args, **kwargs)
+            told(*args, **kwargs)
         except Exception as error:
             failed = True
             warnings.warn(

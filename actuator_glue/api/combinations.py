@@ -11,21 +11,18 @@ import numpy as np
 
 from actuator_glue.api import judgement, store
 from actuator_glue.api.calibration import Progress, calibrate
+from actuator_glue.api.calibration_error import best_residuals
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
-from actuator_glue.api.calibration_parts import Marginal, marginals_frame, marginals_json
-from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.calibration_parts import marginals, marginals_frame, marginals_json
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.api.given import Records, records_given
-from actuator_glue.api.matlab import Exported, TransferFunction, delay_of, write_mat
+from actuator_glue.api.matlab import TransferFunction, delay_of, write_mat
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
 from actuator_glue.diagnosis.verdict.residual_structure import DIAGNOSE
 from actuator_glue.errors import InputError
-from actuator_glue.given import path as given_path
 from actuator_glue.hygiene.checks import pull
 from actuator_glue.hygiene.unlike_rest import unlike_rest
-from actuator_glue.inference.moments import moments
-from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.motion import METRES, speaking
 from actuator_glue.records import Array, Record, source_names
@@ -107,9 +104,9 @@ class Combinations(Result, CombinationsData):
         Raises:
             InputError: the file cannot be written.
         """
-        units = [p.unit for p in self.combinations.values()]
-        of = Exported(self.posterior, tuple(self.combinations), units, self.effects, self.problems)
-        return write_mat(path, of, [_transfer(self)])
+        units = {name: p.unit for name, p in self.combinations.items()}
+        models, effects, problems = [_transfer(self)], self.effects, self.problems
+        return write_mat(path, self.posterior, units, models, effects=effects, problems=problems)
 
     def plot(self) -> Figure:
         """Return a figure of the distribution of each combination, and of each pair."""
@@ -150,7 +147,7 @@ class Combinations(Result, CombinationsData):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(given_path(path), self.page(next_command))
+            return html.write(path, self.page(next_command))
 
 
 @takes(CalibrationOptions)
@@ -194,7 +191,10 @@ def combinations(
     stand_in = [replace(r, force=None, motion=METRES, stiffness=_STAND_IN) for r in given]
     found = calibrate(stand_in, options, progress=progress)
     draws = _combined(found.draws)
-    known = _marginals(draws, _combined(found.best), found, [p.unit for p in own])
+    rest = list(found.parameters.items())[4:]
+    units = COMBINATIONS | {name: p.unit for name, p in rest}
+    bounds = [(0.0, math.inf)] * len(COMBINATIONS) + [p.bounds for _, p in rest]
+    known = marginals(draws, _combined(found.best), units, bounds)
     told = judgement.remarks(
         found.records,
         found.parameters,
@@ -224,20 +224,9 @@ def combinations(
         seconds=found.seconds,
         records=tuple(given),
         structure=found.structure,
-        residuals=_residuals(found),
+        residuals=tuple(best_residuals(found)),
         pull=found_pull,
     )
-
-
-def _residuals(found: Calibration) -> tuple[Array, ...]:
-    """Return the best draw's residual in each record [m]."""
-    structure = Structure(found.effects)
-    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
-    out = []
-    for record in found.records:
-        moved = structure.simulate(found.best, record, initial=initial)
-        out.append((record.measured - np.ravel(moved))[round(found.settle / record.period) :])
-    return tuple(out)
 
 
 def _transfer(found: CombinationsData) -> TransferFunction:
@@ -258,35 +247,6 @@ def _combined(draws: Array) -> Array:
     share = leak * _STAND_IN / total
     made = np.stack([loop / total, beta_1 + share, beta_1 * share], axis=-1)
     return np.concatenate([made, draws[..., 4:]], axis=-1)
-
-
-def _marginals(
-    draws: Array, best: Array, found: Calibration, units: list[str]
-) -> dict[str, Marginal]:
-    import arviz as az
-
-    flat = draws.reshape(-1, draws.shape[-1])
-    bounds = [(0.0, float('inf'))] * len(COMBINATIONS)
-    bounds += [p.bounds for p in list(found.parameters.values())[4:]]
-    names = [*COMBINATIONS, *list(found.parameters)[4:]]
-    found_moments = moments(flat, flat.min(axis=0), flat.max(axis=0))
-    data = az.convert_to_dataset({'theta': np.swapaxes(draws, 0, 1)})
-    rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
-    return {
-        name: Marginal(
-            mean=float(found_moments.mean[i]),
-            stddev=float(found_moments.stddev[i]),
-            skewness=float(found_moments.skewness[i]),
-            cov=float(found_moments.cov[i]),
-            rhat=float(rhat[i]),
-            ess=float(ess[i]),
-            best=float(best[i]),
-            unit=unit,
-            bounds=bounds[i],
-            prior_dominated=False,
-        )
-        for i, (name, unit) in enumerate(zip(names, [*COMBINATIONS.values(), *units], strict=True))
-    }
 
 
 def _pushed(records: list[Record]) -> tuple[float | None, list[str]]:

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.api import tracking
 from actuator_glue.api.calibration_report import (
+    PANELS,
+    before_after,
     certainty,
     delays,
-    error_line,
     errors,
+    first_sections,
+    in_brief,
     residuals,
     verdict,
 )
@@ -23,7 +25,6 @@ from actuator_glue.records import source_names
 from actuator_glue.report import html
 from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.posterior_figure import posterior_figure
-from actuator_glue.report.quantity import said_in, spread
 from actuator_glue.report.residual_figure import Left
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 HEADER = ('combination', 'unit', 'mean', 'sd', 'R-hat')
 TITLE = 'b, a and c of x/u = b / (s^2 + a s + b + c), Eq. (2), and effects'
 _LETTERS = ('b', 'a', 'c')
-_PANELS = 4  # records in the first picture
 _FAR = 100.0  # times the largest draw: no bound of a combination
 
 
@@ -43,12 +43,13 @@ def figure(found: CombinationsData) -> Figure:
     return posterior_figure(found.posterior, (*_LETTERS, *rest), units)
 
 
-def rows(found: CombinationsData) -> list[tuple[str, ...]]:
-    """Return a row of text for each combination, under HEADER."""
-    return [
+def moments(found: CombinationsData) -> html.Table:
+    """Return the table of what is known of each combination."""
+    rows = [
         (name, p.unit, f'{p.mean:.5g}', f'{p.stddev:.3g}', f'{p.rhat:.4f}')
         for name, p in found.combinations.items()
     ]
+    return html.Table(HEADER, rows, TITLE)
 
 
 def first_page(found: CombinationsData, *, drawn: bool = True) -> FirstPage:
@@ -81,7 +82,7 @@ def _left(found: CombinationsData) -> list[Left]:
     noise = None if found.structure is None else found.structure.noise_m
     out = []
     called = source_names(record.source for record in found.records)
-    for record, error in list(zip(found.records, found.residuals, strict=True))[:_PANELS]:
+    for record, error in list(zip(found.records, found.residuals, strict=True))[:PANELS]:
         title = f'{called[record.source] or "record"}: k not known'
         out.append(Left(title, record.time[len(record) - len(error) :], error, noise))
     return out
@@ -89,25 +90,9 @@ def _left(found: CombinationsData) -> list[Left]:
 
 def _parameters(found: CombinationsData) -> html.Table:
     meanings = {p.name: p.meaning for p in Structure(found.effects).parameters}
-    meanings |= dict(
-        zip(
-            COMBINATIONS,
-            (f'{letter} of the transfer function' for letter in _LETTERS),
-            strict=True,
-        )
-    )
-    ends = np.quantile(found.posterior, (0.025, 0.975), axis=0).T
-    told = []
-    for (name, p), (low, high) in zip(found.combinations.items(), ends, strict=True):
-        before = 'not negative'
-        if np.isfinite(p.bounds[1]):
-            factor, unit = said_in(p.unit, *p.bounds)
-            before = f'{factor * p.bounds[0]:.3g} to {factor * p.bounds[1]:.3g} {unit}'.rstrip()
-        after = spread(p.mean, float(low), float(high), p.unit)
-        told.append([name, meanings.get(name, ''), before, after])
-    header = ['parameter', 'what it is', 'before', 'after']
-    caption = 'Parameters before (bounds) and after (means, 95 % intervals).'
-    return html.Table(header, told, caption, prose=True)
+    letters = zip(COMBINATIONS, _LETTERS, strict=True)
+    meanings |= {name: f'{letter} of the transfer function' for name, letter in letters}
+    return before_after(found.combinations, found.posterior, meanings)
 
 
 def next_command(found: CombinationsData) -> str:
@@ -125,13 +110,7 @@ def next_command(found: CombinationsData) -> str:
 
 def brief(found: CombinationsData) -> list[html.Block]:
     """Return problems, combinations, error and what they cost."""
-    return [
-        *(html.Note(line) for line in found.problems),
-        html.Table(HEADER, rows(found), TITLE),
-        html.Text(error_line(found.error, found.structure)),
-        *tracking.tables(found.tracking),
-        *(html.Note(line) for line in found.notes),
-    ]
+    return in_brief(found, moments(found))
 
 
 def page(found: CombinationsData, next_command: str = '') -> html.Page:
@@ -142,17 +121,8 @@ def page(found: CombinationsData, next_command: str = '') -> html.Page:
         next_command: what to type next; empty for a command over the same files.
     """
     first = first_page(found).ending_with(next_command)
-    posterior: list[html.Block] = [
-        html.Table(HEADER, rows(found), TITLE),
-        html.Picture.of(figure(found), 'Distribution of each combination; b, a, c as above.'),
-        *(html.Note(line) for line in found.notes[1:]),
-    ]
-    sections = [
-        html.Section('The answer', first.blocks(headline=False)),
-        html.Section('Posterior', posterior),
-    ]
-    if found.tracking:
-        tables = tracking.tables(found.tracking)
-        sections.append(html.Section('How the actuator follows its command', tables))
+    picture = html.Picture.of(figure(found), 'Distribution of each combination; b, a, c as above.')
+    known: list[html.Block] = [moments(found), picture, *map(html.Note, found.notes[1:])]
+    sections = first_sections(first, known, found.tracking)
     made = f'{found.evaluations} evaluations'
     return html.Page('Calibration without a stiffness', first.verdict[0], sections, made)

@@ -13,9 +13,10 @@ from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.partition_given import partition_given
-from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
+from actuator_glue.api.rths import DRAWS, rths
 from actuator_glue.api.shown import Shown
 from actuator_glue.api.stability import StabilityResult
+from actuator_glue.api.tracking import FREQUENCIES
 from actuator_glue.hybrid.compensator import KINDS
 from actuator_glue.hybrid.ground_motion import GroundMotion
 from actuator_glue.hybrid.partition import Partition

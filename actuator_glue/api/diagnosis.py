@@ -160,9 +160,7 @@ class Diagnosis(PosteriorModel, DiagnosisData):
                 'a record has settings of its own in this model, so that it tells nothing of '
                 'other tests: diagnose the records apart'
             )
-        known = dict(self.base)
-        for effect in self.effects:
-            known |= effect.parameters
+        known = self._sizes()
         left = self._left()
         if left is not None:
             left = replace(left, sd=math.hypot(left.sd, self.fine))
@@ -177,6 +175,13 @@ class Diagnosis(PosteriorModel, DiagnosisData):
             tuple(dict.fromkeys(t.stiffness for t in self.traces)),
             () if self.complete else (self.summary(),),
         )
+
+    def _sizes(self) -> dict[str, Estimate]:
+        """Return every parameter that is told: Eq. (2)'s and the effects'."""
+        known = dict(self.base)
+        for effect in self.effects:
+            known |= effect.parameters
+        return known
 
     def _left(self) -> ResidualModel | None:
         """Return what the model left of the held-out data, as these were fitted: of means."""
@@ -216,10 +221,7 @@ class Diagnosis(PosteriorModel, DiagnosisData):
             groups |= predicted(self, of_means, self.records, self.held)
         data.add_groups(groups)
         data.posterior.attrs.update({k: v for k, v in self.sampler.items() if v is not None})
-        known = dict(self.base)
-        for effect in self.effects:
-            known |= effect.parameters
-        for name, estimate in known.items():
+        for name, estimate in self._sizes().items():
             if name in draws:
                 data.posterior[name].attrs['unit'] = estimate.unit
                 if estimate.bounds:
@@ -398,7 +400,7 @@ def diagnose(
             seed=options.seed,
             each=pool.map,
             progress=harmless(progress) if callable(progress) else lambda stage, share: bar(share),
-            first_look=harmless(first_look),
+            first_look=None if first_look is None else harmless(first_look),
             settings=Thresholds(
                 false_alarms=options.false_alarms,
                 use_force=options.use_force,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_glue.api.drawn import Drawn
-from actuator_glue.api.ensemble import SIZE
+from actuator_glue.api.drawn import Drawn, evenly
 from actuator_glue.api.inference_groups import BLOCK, SAMPLES, GroupColumn, at_step, dataset
 from actuator_glue.diagnosis.samples.preparation import prepare
 from actuator_glue.diagnosis.telling.result import DiagnosisData
@@ -60,7 +59,7 @@ def predicted(
     sides = _sides(found, records, held)
     if not sides or of.residual is None:
         return {}
-    rows = np.linspace(0, len(of.draws) - 1, min(SIZE, len(of.draws))).astype(np.intp)
+    rows = evenly(np.arange(len(of.draws)))
     table = table_of(of.draws[rows], of.names, of.structure)
     shape = (1, len(rows))
     rng = np.random.default_rng(0)

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
+
+SIZE = 200  # draws that are simulated for a band
+
+Kind = TypeVar('Kind', bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,3 +42,12 @@ class Drawn:
     records: tuple[Record, ...]
     stiffness: tuple[float, ...]
     problems: tuple[str, ...]
+
+    def some(self, count: int) -> Drawn:
+        """Return so many of the draws, evenly spread over them."""
+        return replace(self, draws=evenly(self.draws, count))
+
+
+def evenly(draws: NDArray[Kind], count: int = SIZE) -> NDArray[Kind]:
+    """Return some of draws (m, p), or of their numbers (m,), evenly spread over them."""
+    return draws[np.linspace(0, len(draws) - 1, min(count, len(draws))).astype(np.intp)]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from actuator_glue.api.drawn import evenly
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.hybrid import sampled, stability
 from actuator_glue.hybrid.actuator import actuator, inside, nonlinear
@@ -81,7 +82,7 @@ def _nonlinear(loop: Loop, chosen: Compensator, amplitude: float) -> dict[str, S
     curved = nonlinear(moving)
     if not curved:
         return {}
-    rows = np.linspace(0, len(loop.draws) - 1, min(_DRAWS, len(loop.draws))).astype(np.intp)
+    rows = evenly(np.arange(len(loop.draws)), _DRAWS)
     partition, draws = loop.partition, loop.draws[rows]
     specimen = {name: column[rows] for name, column in loop.specimen.items()}
     system = System(*(part[rows] for part in loop.actuators.system))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from typing import TypeAlias
 
@@ -19,14 +20,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, Record, check_stiffness
 
-SIZE = 200  # draws that are simulated for a band
-
 GivenCommand: TypeAlias = Command | Record | PathLike[str] | str | ArrayLike
-
-
-def evenly(draws: Array, count: int = SIZE) -> Array:
-    """Return some of draws (m, p), evenly spread over them."""
-    return draws[np.linspace(0, len(draws) - 1, min(count, len(draws))).astype(np.intp)]
 
 
 def simulated(
@@ -72,36 +66,38 @@ def residual_of(parts: Sequence[Array], parameters: int) -> ResidualModel | None
 
 
 def commanded(
-    command: GivenCommand, stiffness: float | None, rate: float | None, hold: Hold | None
+    command: GivenCommand,
+    stiffness: float | None,
+    rate: float | None,
+    hold: Hold | None,
+    motion: str,
 ) -> tuple[Record, bool]:
     """Return a test that is to be simulated, and whether its displacement was measured.
+
+    What was measured under another stiffness is none of this test.
 
     Args:
         command: a shape, a record or a file of one, or samples [m].
         stiffness: specimen stiffness [N/m]; None for what the record says.
         rate: of samples [Hz]; shapes and records have their own.
         hold: how samples run from one to the next; None for what the record says, else 'zoh'.
+        motion: what the draws were fitted to, which a record must move in.
 
     Raises:
-        InputError: samples without a rate or with an impossible one, no stiffness, or what is no
-            command.
+        InputError: a record that moves in another unit, samples without a rate or with an
+            impossible one, no stiffness, or what is no command.
     """
     if isinstance(command, Command):
         samples, period = command.samples(), 1.0 / command.rate
     elif isinstance(command, (Record, str, PathLike)):
         record = one_record_given(command)
-        return (
-            Record(
-                record.command,
-                record.measured,
-                record.period,
-                check_stiffness(record.known_stiffness() if stiffness is None else stiffness),
-                hold=hold or record.hold,
-                source=record.source,
-                motion=record.motion,
-            ),
-            True,
-        )
+        if record.motion != motion:
+            raise InputError(
+                f'the command moves in {record.motion}, and what was fitted moves in {motion}'
+            )
+        k = record.known_stiffness() if stiffness is None else check_stiffness(stiffness)
+        measured = record.stiffness in (None, k)
+        return replace(record, stiffness=k, hold=hold or record.hold), measured
     else:
         samples = vector(command, 'command')
         if samples.ndim != 1:
@@ -114,11 +110,8 @@ def commanded(
         period = 1.0 / _rate(rate)
     if stiffness is None:
         raise InputError('give the specimen stiffness [N/m], 0 for a free actuator')
-    shape = np.shape(samples)
-    return (
-        Record(samples, np.zeros(shape), period, check_stiffness(stiffness), hold=hold or 'zoh'),
-        False,
-    )
+    nothing, k = np.zeros(np.shape(samples)), check_stiffness(stiffness)
+    return Record(samples, nothing, period, k, hold=hold or 'zoh'), False
 
 
 def _rate(rate: float) -> float:

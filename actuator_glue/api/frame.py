@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.errors import InputError
+from actuator_glue.optional_library import library
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -22,10 +22,6 @@ def frame(content: Sequence[Mapping[str, Any]] | Mapping[str, Any], index: str) 
     Raises:
         InputError: pandas is not installed; the message says what to install.
     """
-    try:
-        import pandas
-    except ImportError as error:
-        raise InputError(
-            "a table needs pandas; install it with `pip install 'actuator_glue[lab]'`"
-        ) from error
-    return pandas.DataFrame(content).set_index(index)
+    pandas = library('pandas', 'a table needs pandas', 'lab')
+    table: DataFrame = pandas.DataFrame(content).set_index(index)
+    return table

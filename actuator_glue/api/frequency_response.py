@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.errors import InputError
 from actuator_glue.given import vector
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 DEFAULT = (0.1, 30.0, 200)  # Hz: from, to, how many
 _BANDS = 120  # of equal ratio, from one line of the spectrum to the highest
@@ -76,62 +73,49 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    draws: Array,
-    names: Sequence[str],
-    structure: Structure,
-    stiffness: float,
-    frequencies: ArrayLike | None = None,
+    of: Drawn, stiffness: float, frequencies: ArrayLike | None = None
 ) -> FrequencyResponse:
     """Return the continuous response x/u of draws.
 
     Args:
-        draws: shape (m, p), SI units.
-        names: parameter of each column; those of a likelihood are passed over.
-        structure: the model.
+        of: the draws.
         stiffness: of the specimen [N/m].
         frequencies: shape (f,) [Hz]; None for 0.1 to 30 Hz.
 
     Raises:
         InputError: frequencies that are not positive.
     """
-    hertz = _positive(np.geomspace(*DEFAULT) if frequencies is None else frequencies)
-    gain, phase = _response(draws, names, structure, stiffness, hertz)
-    return _limits(gain, phase, hertz, structure, stiffness)
+    given = np.geomspace(*DEFAULT) if frequencies is None else frequencies
+    hertz = np.atleast_1d(vector(given, 'frequencies'))
+    if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
+        raise InputError('frequencies must be positive numbers [Hz]')
+    hertz = np.sort(hertz)
+    gain, phase = _response(of, stiffness, hertz)
+    return _limits(gain, phase, hertz, of.structure, stiffness)
 
 
-def recorded_response(
-    draws: Array,
-    names: Sequence[str],
-    structure: Structure,
-    record: Record,
-    frequencies: ArrayLike | None = None,
-) -> FrequencyResponse:
+def recorded_response(of: Drawn, record: Record) -> FrequencyResponse:
     """Return the response that draws expect between the samples of a record, and the record's own.
 
     A command that is held from sample to sample lags by half a period more: that is in both.
 
     Args:
-        draws: shape (m, p), SI units.
-        names: parameter of each column; those of a likelihood are passed over.
-        structure: the model.
+        of: the draws.
         record: the test; its stiffness must be known.
-        frequencies: shape (f,) [Hz]; None for those that the record excited.
 
     Raises:
-        InputError: frequencies that are not positive, or a record that excites none.
+        InputError: a record that excites no frequency.
     """
     measured = measured_response(record)
-    if frequencies is None:
-        highest = min(1.5 * float(measured.frequency[-1]), 0.45 * record.rate)
-        frequencies = np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2])
-    hertz = _positive(frequencies)
+    highest = min(1.5 * float(measured.frequency[-1]), 0.45 * record.rate)
+    hertz = np.sort(np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2]))
     stiffness = record.known_stiffness()
 
     def expected(at: Array) -> tuple[Array, Array]:
         held = np.sinc(at * record.period) ** (2 if record.hold == 'linear' else 1)
         if record.hold == 'zoh':
             held = held * np.exp(-1j * np.pi * at * record.period)
-        gain, phase = _response(draws, names, structure, stiffness, at)
+        gain, phase = _response(of, stiffness, at)
         # A hold turns by less than half a turn at every frequency: its angle is all of it.
         return gain * np.abs(held), phase + np.angle(held)
 
@@ -140,24 +124,14 @@ def recorded_response(
     turns = np.rint((lowest - measured.phase[0]) / 360.0)
     measured = measured._replace(phase=measured.phase + 360.0 * turns)
     gain, phase = expected(hertz)
-    return _limits(gain, phase, hertz, structure, stiffness, measured)
+    return _limits(gain, phase, hertz, of.structure, stiffness, measured)
 
 
-def _positive(frequencies: ArrayLike) -> Array:
-    hertz = np.atleast_1d(vector(frequencies, 'frequencies'))
-    if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
-        raise InputError('frequencies must be positive numbers [Hz]')
-    return np.sort(hertz)
-
-
-def _response(
-    draws: Array, names: Sequence[str], structure: Structure, stiffness: float, hertz: Array
-) -> tuple[Array, Array]:
+def _response(of: Drawn, stiffness: float, hertz: Array) -> tuple[Array, Array]:
     """Return gain and phase [rad] of what the recording transducer shows, (m, f) each."""
-    table = table_of(draws, names, structure)
-    linear = actuator(
-        table, structure.names, structure.entries, np.full(len(table), float(stiffness))
-    )
+    table, model = table_of(of.draws, of.names, of.structure), of.structure
+    k = np.full(len(table), float(stiffness))
+    linear = actuator(table, model.names, model.entries, k)
     w = 2.0 * np.pi * hertz
     seen = np.broadcast_to(linear.shown, linear.system.C.shape)
     recorded = linear.system._replace(C=seen)
@@ -228,25 +202,6 @@ def measured_response(record: Record) -> MeasuredResponse:
     turns = np.unwrap(np.angle(response[used]))
     turns -= 2.0 * np.pi * np.rint(turns[0] / (2.0 * np.pi))
     return MeasuredResponse(middle[used], np.abs(response[used]), np.degrees(turns))
-
-
-def bode_figure(responses: Sequence[tuple[str, FrequencyResponse]]) -> Figure:
-    """Return a figure of responses side by side, each under its title."""
-    from actuator_glue.report.bode_figure import Bode, bode
-
-    return bode(
-        [
-            Bode(
-                title,
-                of.frequency,
-                of.gain,
-                of.phase,
-                of.delay,
-                None if of.measured is None else of.measured,
-            )
-            for title, of in responses
-        ]
-    )
 
 
 def title(of: FrequencyResponse, name: str = '') -> str:

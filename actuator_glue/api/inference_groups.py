@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.calibration_data import CalibrationData
-from actuator_glue.api.ensemble import SIZE
+from actuator_glue.api.drawn import SIZE, evenly
 from actuator_glue.hybrid.actuator import table_of
 from actuator_glue.inference.likelihood import PHI
 from actuator_glue.inference.predictive import ResidualModel, predictive_draws
-from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
@@ -76,7 +75,7 @@ def dataset(
 def _of_records(found: CalibrationData) -> dict[str, xarray.Dataset]:
     steps, chains, _ = found.draws.shape
     each = max(2, -(-SIZE // chains))
-    used = np.unique(np.linspace(0, steps - 1, min(each, steps)).astype(np.intp))
+    used = evenly(np.arange(steps), each)
     rows = np.ascontiguousarray(found.draws[used].reshape(len(used) * chains, -1))
     shape = (len(used), chains)
     phi = rows[:, found.names.index(PHI.name)] if PHI.name in found.names else None
@@ -87,14 +86,13 @@ def _of_records(found: CalibrationData) -> dict[str, xarray.Dataset]:
     rng = np.random.default_rng(found.seed)
     structure = Structure(found.effects)
     table = table_of(rows, found.names, structure)
-    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
     for number, record in enumerate(found.records, 1):
         settle = round(found.settle / record.period)
         some = np.arange(settle, len(record), max(1, -(-(len(record) - settle) // SAMPLES)))
         kept = np.empty((len(rows), len(some)))
         for start in range(0, len(rows), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            moved = structure.simulate(table[part], record, initial=initial)
+            moved = structure.simulate(table[part], record, initial=found.initial)
             kept[part] = moved[:, some]
             error = record.measured[settle:] - moved[:, settle:]
             likelihood.add(part, number - 1, error, None if phi is None else phi[part])

@@ -28,9 +28,9 @@ def problems(
     found: Sequence[Pressed],
     parameters: Mapping[str, Marginal],
     fit: FitError,
-    prior: PriorUse | None = None,
-    left: ResidualStructure | None = None,
-    doubtful: Sequence[str] = (),
+    prior: PriorUse | None,
+    left: ResidualStructure | None,
+    doubtful: Sequence[str],
 ) -> list[str]:
     """Return why a posterior must not be used as it stands, one line each; empty where it may.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,24 +13,6 @@ from actuator_glue.errors import InputError
 from actuator_glue.given import path as given_path
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array
-
-
-class Exported(NamedTuple):
-    """What goes into the file.
-
-    Attributes:
-        draws: shape (m, p), SI units.
-        names: parameter of each column.
-        units: their units.
-        effects: of the model beyond Eq. (2).
-        problems: why the posterior must not be used as it stands.
-    """
-
-    draws: Array
-    names: Sequence[str]
-    units: Sequence[str]
-    effects: Sequence[str]
-    problems: Sequence[str]
 
 
 class TransferFunction(NamedTuple):
@@ -51,13 +33,12 @@ class TransferFunction(NamedTuple):
     den_draws: Array
 
 
-def under(of: Exported, stiffness: float) -> TransferFunction:
-    """Return Eq. (2a) of a posterior under a stiffness [N/m]."""
-    names = list(of.names)
+def under(draws: Array, names: Sequence[str], stiffness: float) -> TransferFunction:
+    """Return Eq. (2a) of draws (m, p) of named parameters under a stiffness [N/m]."""
     columns = [names.index(name) for name in NAMES]
-    mean = of.draws.mean(axis=0)
+    mean = draws.mean(axis=0)
     late = delay_of(names, mean)
-    drawn = [polynomials(theta, stiffness) for theta in of.draws[:, columns]]
+    drawn = [polynomials(theta, stiffness) for theta in draws[:, columns]]
     rows = np.array([n for n, _ in drawn]), np.array([d for _, d in drawn])
     return TransferFunction(stiffness, *polynomials(mean[columns], stiffness), late, *rows)
 
@@ -84,7 +65,15 @@ def polynomials(theta: Array, stiffness: float) -> tuple[Array, Array]:
     return np.array([gain]), np.array([k + alpha_2, middle, beta_1 * alpha_3 * k + gain])
 
 
-def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]) -> Path:
+def write_mat(
+    path: Path | str,
+    draws: Array,
+    units: Mapping[str, str],
+    models: Sequence[TransferFunction],
+    *,
+    effects: Sequence[str],
+    problems: Sequence[str],
+) -> Path:
     """Write draws and models under some stiffnesses to a .mat file; return its path.
 
     Its folder is made if need be.
@@ -96,8 +85,11 @@ def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]
 
     Args:
         path: where to.
-        of: the posterior.
+        draws: of the posterior, shape (m, p), SI units.
+        units: unit of each parameter by name, in the order of the columns.
         models: one for each stiffness.
+        effects: of the model beyond Eq. (2).
+        problems: why the posterior must not be used as it stands.
 
     Raises:
         InputError: no path, or the file cannot be written.
@@ -107,14 +99,14 @@ def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]
     for i, each in enumerate(models):
         model[0, i] = tuple(each)
     content = {
-        'draws': of.draws,
-        'names': _cells(of.names),
-        'units': _cells(of.units),
-        'effects': _cells(of.effects),
-        'problems': _cells(of.problems),
-        'mean': of.draws.mean(axis=0),
-        'stddev': of.draws.std(axis=0),
-        'covariance': np.atleast_2d(np.cov(of.draws, rowvar=False)),
+        'draws': draws,
+        'names': _cells([*units.keys()]),
+        'units': _cells([*units.values()]),
+        'effects': _cells(effects),
+        'problems': _cells(problems),
+        'mean': draws.mean(axis=0),
+        'stddev': draws.std(axis=0),
+        'covariance': np.atleast_2d(np.cov(draws, rowvar=False)),
         'model': model,
     }
     path = given_path(path)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-
 from actuator_glue.api import store
+from actuator_glue.api.calibration_data import as_prior
 from actuator_glue.inference.carried import Carried
 from actuator_glue.records import Array
-
-# Normal components of the prior that it makes, at most.
-_COMPONENTS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +38,4 @@ class PooledPrior:
 
     def carried(self) -> Carried:
         """Return the draws as a prior."""
-        from actuator_glue.inference.mixture_density import components
-
-        found = Carried.thinned(self.names, self.draws)
-        return replace(found, components=components(np.log(found.draws), _COMPONENTS))
+        return as_prior(self.names, self.draws)

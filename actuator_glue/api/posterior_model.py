@@ -12,16 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.api import frequency_response as response
-from actuator_glue.api.drawn import Drawn
-from actuator_glue.api.ensemble import GivenCommand, commanded, evenly, simulated
+from actuator_glue.api.drawn import Drawn, evenly
+from actuator_glue.api.ensemble import GivenCommand, commanded, simulated
 from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
-from actuator_glue.api.matlab import Exported, under, write_mat
+from actuator_glue.api.matlab import under, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
 from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
-from actuator_glue.given import path as given_path
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.motion import speaking
 from actuator_glue.records import Hold, check_stiffness, source_names
@@ -65,7 +64,7 @@ class PosteriorModel(Result):
         Args:
             command: a shape (`Command`), a record or a file of one, or samples [m], shape (n,).
             stiffness: specimen stiffness [N/m], 0 for a free actuator; None for what a record
-                says.
+                says, whose displacement counts as measured under its own alone.
             rate: of samples [Hz]; shapes and records have their own.
             hold: how samples run from one to the next, 'zoh' or 'linear'; None for what a record
                 says, else 'zoh'.
@@ -78,11 +77,7 @@ class PosteriorModel(Result):
             >>> posterior.predict(Command('earthquake'), 250e3).plot()  # doctest: +SKIP
         """
         of = self.drawn()
-        record, measured = commanded(command, stiffness, rate, hold)
-        if measured and record.motion != self.motion:
-            raise InputError(
-                f'the command moves in {record.motion}, and what was fitted moves in {self.motion}'
-            )
+        record, measured = commanded(command, stiffness, rate, hold, self.motion)
         moved = simulated(evenly(of.draws), of.names, of.structure, record)
         found = prediction(record, moved, of.residual, measured=measured, problems=of.problems)
         return replace(found, motion=self.motion)
@@ -101,11 +96,8 @@ class PosteriorModel(Result):
         Raises:
             InputError: an impossible stiffness or impossible frequencies.
         """
-        of = self.drawn()
         k = check_stiffness(stiffness)
-        return response.frequency_response(
-            evenly(of.draws, 1000), of.names, of.structure, k, frequencies
-        )
+        return response.frequency_response(self.drawn().some(1000), k, frequencies)
 
     def plot_bode(
         self, record: OneRecord | None = None, *, stiffness: float | None = None
@@ -120,23 +112,24 @@ class PosteriorModel(Result):
         Raises:
             InputError: a record of which nothing can be told, or no stiffness.
         """
-        of = self.drawn()
-        draws = evenly(of.draws, 1000)
+        of = self.drawn().some(1000)
         shown: list[tuple[str, FrequencyResponse]] = []
         if stiffness is None:
             given = of.records if record is None else (one_record_given(record),)
             called = source_names(test.source for test in (*of.records, *given))
             for test in given[:_SIDE_BY_SIDE]:
-                found = response.recorded_response(draws, of.names, of.structure, test)
+                found = response.recorded_response(of, test)
                 shown.append((response.title(found, called[test.source]), found))
         if not shown:
             known = of.stiffness if stiffness is None else (check_stiffness(stiffness),)
             for k in known[:_SIDE_BY_SIDE]:
-                found = response.frequency_response(draws, of.names, of.structure, k)
+                found = response.frequency_response(of, k)
                 shown.append((response.title(found), found))
         if not shown:
             raise InputError('give a record, or a specimen stiffness [N/m] as stiffness=0.0')
-        return response.bode_figure(shown)
+        from actuator_glue.api.bode_figure import bode_figure
+
+        return bode_figure(shown)
 
     def hybrid(self, partition: Partition | Path | str | None) -> str:
         """Return what the actuator means for a hybrid test, in a sentence; empty without one.
@@ -188,7 +181,7 @@ class PosteriorModel(Result):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(given_path(path), self.page(partition, next_command))
+            return html.write(path, self.page(partition, next_command))
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""
@@ -230,5 +223,7 @@ class PosteriorModel(Result):
         of = self.drawn()
         several: Any = of.stiffness if stiffness is None else stiffness
         several = np.ravel(np.asarray(several, dtype=object))
-        what = Exported(of.draws, of.names, of.units, of.structure.effects, of.problems)
-        return write_mat(path, what, [under(what, check_stiffness(k)) for k in several])
+        models = [under(of.draws, of.names, check_stiffness(k)) for k in several]
+        units = dict(zip(of.names, of.units, strict=True))
+        effects, problems = of.structure.effects, of.problems
+        return write_mat(path, of.draws, units, models, effects=effects, problems=problems)

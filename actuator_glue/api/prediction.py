@@ -83,18 +83,16 @@ class Prediction:
 
     def plot(self) -> Figure:
         """Return a figure of command, median, band, and what was measured where that is known."""
-        from actuator_glue.report.prediction_figure import Predicted, prediction_figure
+        from actuator_glue.report.prediction_figure import prediction_figure
 
         return prediction_figure(
-            Predicted(
-                self.time,
-                self.command,
-                self.measured,
-                self.median,
-                (self.lower, self.upper),
-                (self.parameter_lower, self.parameter_upper),
-                self.motion,
-            )
+            self.time,
+            self.command,
+            self.median,
+            (self.lower, self.upper),
+            (self.parameter_lower, self.parameter_upper),
+            self.measured,
+            self.motion,
         )
 
 

@@ -21,19 +21,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+Table = tuple[tuple[str, ...], list[tuple[str, ...]]]  # header and rows
 ROWS = 20  # windows shown to people; JSON has all
 TITLE = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
 IF_TRUE = 'The parameters if each explanation of the last window is true: mean +- s. d.'
 TRACKING = 'How the actuator followed each window: median (95 % limits)'
 
 
-def header(found: ReplayData) -> tuple[str, ...]:
-    """Return the columns of `rows`."""
-    return ('window', 'end [s]', *_names(found), 'R-hat', 'rms [um]', 'cover')
-
-
-def rows(found: ReplayData) -> list[tuple[str, ...]]:
-    """Return a row of text for each of some windows, evenly chosen where there are many."""
+def windows_table(found: ReplayData) -> Table:
+    """Return header and rows of some windows, evenly chosen where there are many."""
     out = []
     number = _numbered(found)
     for w in _some(_windows(found)):
@@ -48,10 +44,10 @@ def rows(found: ReplayData) -> list[tuple[str, ...]]:
                 f'{100 * coverage[-1]:.0f} %' if coverage else '-',
             )
         )
-    return out
+    return ('window', 'end [s]', *_names(found), 'R-hat', 'rms [um]', 'cover'), out
 
 
-def tracking_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+def tracking_table(found: ReplayData) -> Table | None:
     """Return header and rows of the tracking numbers; None where nobody asked for them.
 
     Of each window median and 95 % limits over the draws.
@@ -73,9 +69,7 @@ def tracking_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, 
     return ('window', 'end [s]', *(f'{text} [{unit}]' for text, unit, _ in units)), out
 
 
-def explanations_table(
-    found: ReplayData,
-) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+def explanations_table(found: ReplayData) -> Table | None:
     """Return header and rows of the explanations over time; None where there was ever one only."""
     course = [(w.end_s, {e.name: e.weight for e in w.explanations}) for w in found.windows]
     told = weights.spells(course)
@@ -83,7 +77,7 @@ def explanations_table(
     return (weights.HEADER, weights.rows(told)) if several else None
 
 
-def if_true_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+def if_true_table(found: ReplayData) -> Table | None:
     """Return what the parameters are if each explanation of the last window is true.
 
     None where that has one only: what it says is in the table of the windows.
@@ -144,17 +138,20 @@ def brief(found: ReplayData) -> list[html.Block]:
         told = [*differing, *lost, *told]
     return [
         html.Text(found.summary()),
-        html.Table(header(found), rows(found), TITLE),
-        *([html.Table(*followed, TRACKING)] if (followed := tracking_table(found)) else []),
-        *_explained(found),
-        *(html.Note(line) for line in told),
+        *tables(found),
+        *map(html.Note, told),
     ]
 
 
-def _explained(found: ReplayData) -> list[html.Block]:
-    """Return the tables of the explanations, where there was ever more than one."""
-    tables = ((weights.TITLE, explanations_table(found)), (IF_TRUE, if_true_table(found)))
-    return [html.Table(*table, title) for title, table in tables if table is not None]
+def tables(found: ReplayData) -> list[html.Block]:
+    """Return the windows, and what else there is to tell of them."""
+    told = (
+        (TITLE, windows_table(found)),
+        (TRACKING, tracking_table(found)),
+        (weights.TITLE, explanations_table(found)),
+        (IF_TRUE, if_true_table(found)),
+    )
+    return [html.Table(*table, title) for title, table in told if table is not None]
 
 
 def page(found: ReplayData) -> html.Page:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from actuator_glue.api import store
 from actuator_glue.api.shown import Shown
-from actuator_glue.given import path as given_path
 from actuator_glue.motion import METRES, speaking, spoken
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ class Result(Shown):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(given_path(path), self.page())
+            return html.write(path, self.page())
 
     def __repr__(self) -> str:
         """Return what came out in a few lines, in the unit of its motion."""

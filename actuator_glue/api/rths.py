@@ -16,6 +16,7 @@ from actuator_glue.api import options
 from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.drawn import evenly
 from actuator_glue.api.effect_cost import effect_costs, margins
 from actuator_glue.api.given import seed_given
 from actuator_glue.api.options import takes
@@ -23,6 +24,7 @@ from actuator_glue.api.partition_given import partition_given
 from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.api.stability_data import AtFrequency, DelayMargin
+from actuator_glue.api.tracking import FREQUENCIES
 from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
 from actuator_glue.given import number, of_kind, whole
@@ -38,7 +40,6 @@ from actuator_glue.hybrid.virtual import DIVERGED, VirtualTest
 from actuator_glue.io.ground_motion import read_ground_motion
 from actuator_glue.records import Array
 
-FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 DRAWS = 1000
 # Logarithm of a growth with which linear loops diverge within a record: from a fifth of the
 # reference's peak to five times it.
@@ -127,9 +128,9 @@ def rths(
             'motion for a virtual test, or calibrate with linear effects only'
         )
     posterior = calibration.posterior
-    rows = np.linspace(0, len(posterior) - 1, min(draws, len(posterior))).astype(np.intp)
-    specimen = partition.specimen.drawn(np.random.default_rng(seed), len(rows))
-    loop = Loop.of(partition, posterior[rows], calibration.names, calibration.effects, specimen)
+    used = evenly(posterior, draws)
+    specimen = partition.specimen.drawn(np.random.default_rng(seed), len(used))
+    loop = Loop.of(partition, used, calibration.names, calibration.effects, specimen)
     ground = None if ground_motion is None else ground_motion.at(partition.period)
     chosen = compensator_of(compensator, loop, ground)
     effective = _effective(calibration)
@@ -191,7 +192,7 @@ def rths(
         effect_cost_s=effect_costs(loop, chosen, margin, moved),
         compensator=str(chosen),
         virtual=virtual,
-        draws=len(rows),
+        draws=len(used),
         seconds=time.perf_counter() - started,
         problems=calibration.problems,
         notes=tuple(notes),

@@ -7,7 +7,8 @@ import json
 import types
 import typing
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -60,31 +61,12 @@ def load(path: Path | str, schema: str, cls: type[T]) -> T:
         InputError: no path, the file cannot be read, or holds something else.
     """
     path = given_path(path)
-    _check_kind(path, schema)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            content = json.loads(str(file[_CONTENT]))
-            if content['schema'] != schema:
-                raise InputError(f'{path}: holds {content["schema"]}, not {schema}')
-            if 'definitions' in content:
-                CATALOGUE.define(content['definitions'], str(path))
-            return typing.cast(T, _unpack(cls, content['value'], file))
-    except InputError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f'{path}: holds no {schema} ({error})') from error
-
-
-def _check_kind(path: Path, what: str) -> None:
-    """Refuse what is no .npz file: numpy would say how to load it unsafely.
-
-    Raises:
-        InputError: no file, or one of another kind.
-    """
-    if not path.exists():
-        raise InputError(f'{path}: there is no such file')
-    if path.is_file() and not zipfile.is_zipfile(path):
-        raise InputError(f'{path}: holds no {what}: it is no .npz file, or a damaged one')
+    with _opened(path, schema) as (file, content):
+        if content['schema'] != schema:
+            raise InputError(f'{path}: holds {content["schema"]}, not {schema}')
+        if 'definitions' in content:
+            CATALOGUE.define(content['definitions'], str(path))
+        return typing.cast(T, _unpack(cls, content['value'], file))
 
 
 def schema_of(path: Path | str) -> str:
@@ -93,13 +75,29 @@ def schema_of(path: Path | str) -> str:
     Raises:
         InputError: no path, the file cannot be read, or holds nothing of ours.
     """
-    path = given_path(path)
-    _check_kind(path, 'result of actuator_glue')
+    with _opened(given_path(path), 'result of actuator_glue') as (_, content):
+        return str(content['schema'])
+
+
+@contextmanager
+def _opened(path: Path, what: str) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Yield the arrays of a file and its content, for messages called so.
+
+    Raises:
+        InputError: no file, or one that cannot be read as ours.
+    """
+    if not path.exists():
+        raise InputError(f'{path}: there is no such file')
+    # Of what is no .npz file numpy would say how to load it unsafely.
+    if path.is_file() and not zipfile.is_zipfile(path):
+        raise InputError(f'{path}: holds no {what}: it is no .npz file, or a damaged one')
     try:
         with np.load(path, allow_pickle=False) as file:
-            return str(json.loads(str(file[_CONTENT]))['schema'])
+            yield file, json.loads(str(file[_CONTENT]))
+    except InputError:
+        raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f'{path}: holds no result of actuator_glue ({error})') from error
+        raise InputError(f'{path}: holds no {what} ({error})') from error
 
 
 def _pack(value: Any, arrays: dict[str, Any]) -> Any:

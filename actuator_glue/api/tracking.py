@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_glue.api.drawn import evenly
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.diagnosis.telling.response import amplitude_of, harmonic, near, phases
 from actuator_glue.hybrid.actuator import actuator, table_of
@@ -62,11 +63,6 @@ class RecordTracking:
     predicted: dict[str, Spread]
     measured: dict[str, float]
 
-    @property
-    def title(self) -> str:
-        """Title of its table."""
-        return f'Tracking of {self.source or "the record"}'
-
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each number, under HEADER."""
         out = []
@@ -83,14 +79,13 @@ def tables(tracking: Sequence[RecordTracking]) -> list[html.Block]:
     """Return a table for each of the first records, and how many more there are."""
     from actuator_glue.report import html
 
-    first = [html.Table(HEADER, of.rows(), of.title) for of in tracking[:MOST]]
-    return [*first, *([html.Text(text)] if (text := more(tracking)) else [])]
-
-
-def more(tracking: Sequence[RecordTracking]) -> str:
-    """Return how many records have no table; nothing where all have one."""
-    count = len(tracking) - MOST
-    return f'tracking of {count} more records: the JSON has it' if count > 0 else ''
+    told: list[html.Block] = [
+        html.Table(HEADER, of.rows(), f'Tracking of {of.source or "the record"}')
+        for of in tracking[:MOST]
+    ]
+    if (more := len(tracking) - MOST) > 0:
+        told.append(html.Note(f'tracking of {more} more records: the JSON has it'))
+    return told
 
 
 def ready(records: Sequence[Record]) -> list[Record]:
@@ -191,8 +186,7 @@ def record_tracking(
 
 def _some(draws: Array, names: Sequence[str], structure: Structure, most: int) -> Array:
     """Return some of the draws, without parameters of the likelihood."""
-    rows = np.linspace(0, len(draws) - 1, min(most, len(draws))).astype(np.intp)
-    return table_of(draws[rows], names, structure)
+    return table_of(evenly(draws, most), names, structure)
 
 
 def _sines(

@@ -43,8 +43,7 @@ class ActuatorHistory(Shown, HistoryData):
         from actuator_glue.campaigns.history_page import page  # draws: slow to import
         from actuator_glue.report import html
 
-        path = path_given(path)
-        return html.write(path, page(self, path.resolve().parent))
+        return html.write(path, page(self, path_given(path).resolve().parent))
 
     def brief(self) -> list[html.Block]:
         """Return the history in a sentence, changes, effects, the next test."""

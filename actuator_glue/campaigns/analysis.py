@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.campaigns.first_stage import first_stage
 from actuator_glue.campaigns.grouping import Task
-from actuator_glue.campaigns.rows import BETWEEN
+from actuator_glue.campaigns.rows import BETWEEN, Row
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.io.whole_file import replaced
@@ -19,9 +19,8 @@ from actuator_glue.records import Array, Record, source_names
 if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.api.diagnosis import Diagnosis
+    from actuator_glue.api.spread import Spread
     from actuator_glue.api.tracking import RecordTracking
-
-Row = dict[str, Any]
 
 
 def analysed(task: Task, keep: Path, key: str) -> Row:
@@ -166,10 +165,13 @@ def _tracked(tracking: Sequence[RecordTracking], source: str) -> Row:
     row: Row = {}
     for of in (t for t in tracking if t.source == source):
         for name, spread in of.predicted.items():
-            row[f'{name}_mean'] = spread.mean
-            row[f'{name}_lower'], row[f'{name}_upper'] = spread.lower, spread.upper
+            row |= _limits(name, spread)
         row |= {f'{name}_measured': value for name, value in of.measured.items()}
     return row
+
+
+def _limits(name: str, of: Spread) -> Row:
+    return {f'{name}_mean': of.mean, f'{name}_lower': of.lower, f'{name}_upper': of.upper}
 
 
 def judged(
@@ -205,6 +207,5 @@ def judged(
         'p_unstable_upper': stable.p_unstable.upper,
     }
     if stable.margin_s is not None:
-        row['margin_s_mean'] = stable.margin_s.mean
-        row['margin_s_lower'], row['margin_s_upper'] = stable.margin_s.lower, stable.margin_s.upper
+        row |= _limits('margin_s', stable.margin_s)
     return row

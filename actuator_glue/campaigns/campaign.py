@@ -115,12 +115,8 @@ def campaign(
     except OSError as error:
         raise InputError(f'{out}: no folder can be made ({error.strerror})') from error
     _write_provenance(rows.folder, recipe, len(tasks), scheduler, analysis)
-    run = _CampaignRun(rows, recipe, analysis, again, progress or _untold)
+    run = _CampaignRun(rows, recipe, analysis, again, progress or (lambda now: None))
     return run.through(tasks, scheduler, workers)
-
-
-def _untold(progress: Progress) -> None:
-    """Report nothing: the default for `progress`."""
 
 
 def _write_provenance(

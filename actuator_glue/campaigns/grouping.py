@@ -13,10 +13,11 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.campaigns.recipe import SAID, FileRule, Recipe, channels_of
+from actuator_glue.campaigns.recipe import SAID, FileRule, Recipe
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import is_bag
 from actuator_glue.io.calendar_time import calendar_time
+from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.formats import formats
 from actuator_glue.io.load import load_records
 from actuator_glue.io.remarks import Note
@@ -63,10 +64,13 @@ class Member:
             if tell is not None:
                 tell(line.replace(self.path, self.name))
 
+        channels = None
+        if self.channels is not None:
+            channels = parse_channel_map(self.channels, f'{self.name}: recipe')
         return load_records(
             self.path,
             stiffness=self.stiffness,
-            channels=channels_of(self.channels, f'{self.name}: recipe'),
+            channels=channels,
             hold=None if self.hold is None else check_hold(self.hold, self.name),
             resample=self.resample,
             gap=told if self.split else None,

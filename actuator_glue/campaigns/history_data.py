@@ -121,10 +121,7 @@ class HistoryData:
                 },
                 'days_ahead': self.pooled.ahead,
                 'scatter_of_days': dict(zip(self.pooled.names, self.pooled.offset, strict=True)),
-                'outliers': [
-                    {'group': o.group, 'day': o.day, 'reason': o.reason, 'report': o.report}
-                    for o in self.outliers
-                ],
+                'outliers': self.outliers,
             }
         )
         return value

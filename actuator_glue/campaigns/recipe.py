@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 from actuator_glue.errors import InputError
 from actuator_glue.given import at_home
-from actuator_glue.io.channel_map import ChannelMap, parse_channel_map
+from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.partition import partition_file, read_partition
 from actuator_glue.io.yaml_file import choice, mapping, number, read_file, texts
 from actuator_glue.records import Hold, check_stiffness
@@ -217,12 +217,3 @@ def _options(content: object, where: str) -> dict[str, Any]:
     except TypeError as error:
         raise InputError(f'{where}: calibrate: {error}') from error
     return options
-
-
-def channels_of(content: Mapping[str, Any] | None, source: str) -> ChannelMap | None:
-    """Return a channel map from what a rule says of it.
-
-    Raises:
-        InputError: as `parse_channel_map`.
-    """
-    return None if content is None else parse_channel_map(dict(content), source)

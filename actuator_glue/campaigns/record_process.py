@@ -13,15 +13,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any
 
 from actuator_glue.campaigns.grouping import Task
+from actuator_glue.campaigns.rows import Row
 from actuator_glue.errors import InputError
 
-Row = dict[str, Any]
 # The work is one thread's, whatever computes: cores are shared out by the number of workers.
 THREADS = (
     'NUMBA_NUM_THREADS',
@@ -31,19 +29,6 @@ THREADS = (
     'VECLIB_MAXIMUM_THREADS',
 )
 _GB = 1 << 30
-
-
-@dataclass(frozen=True, slots=True)
-class RecordLimits:
-    """What one group may take.
-
-    Attributes:
-        seconds: time [s].
-        memory_gb: memory [GB].
-    """
-
-    seconds: float
-    memory_gb: float
 
 
 class RecordProcess:
@@ -60,20 +45,20 @@ class RecordProcess:
         self.analysis, self.memory_gb = analysis, memory_gb
         self._process: subprocess.Popen[bytes] | None = None
 
-    def row(self, task: Task, folder: Path, key: str, limits: RecordLimits) -> Row:
-        """Return what the analysis makes of a task, or a row that says why there is nothing."""
+    def row(self, task: Task, folder: Path, key: str, seconds: float) -> Row:
+        """Return what the analysis makes of a task in so many seconds, or why that is nothing."""
         process = self._started()
         assert process.stdin is not None
         order = {'task': task.to_json(), 'folder': str(folder), 'key': key}
         try:
             process.stdin.write(json.dumps(order).encode() + b'\n')
             process.stdin.flush()
-            answer = self._answer(process, limits.seconds)
+            answer = self._answer(process, seconds)
         except BrokenPipeError:
             answer = b''
         if answer is None:
             self.close()
-            return {'failure': f'took longer than {limits.seconds:g} s'}
+            return {'failure': f'took longer than {seconds:g} s'}
         if not answer:
             return {'failure': self._end(process)}
         row: Row = json.loads(answer)

@@ -11,7 +11,7 @@ from pathlib import Path
 from actuator_glue import __version__
 from actuator_glue.campaigns.cluster import forget_names
 from actuator_glue.campaigns.grouping import Task
-from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess
+from actuator_glue.campaigns.record_process import RecordProcess
 from actuator_glue.campaigns.rows import BETWEEN, Row, RowFolder, content, fingerprint, key_of
 
 # The process of each of a worker's threads.
@@ -43,7 +43,8 @@ def carry_out(
             rows.write(key, {**known, 'fingerprint': fingerprint(task)})
         return key, bool(known['failure']), False
     started = time.perf_counter()
-    found = _process(analysis, limits[1]).row(task, Path(folder), key, RecordLimits(*limits))
+    seconds, memory_gb = limits
+    found = _process(analysis, memory_gb).row(task, Path(folder), key, seconds)
     rows.write(key, row_of(task, key, hashes, found, time.perf_counter() - started))
     return key, bool(found.get('failure')), True
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Input
 from actuator_glue.cli._as_asked import as_asked
-from actuator_glue.cli._output import say, table
+from actuator_glue.cli._output import say, show
 
 if TYPE_CHECKING:
     from actuator_glue.report.first_page import FirstPage
@@ -26,12 +26,7 @@ def add_partition(parser: argparse.ArgumentParser) -> None:
 
 def show_first(page: FirstPage, args: argparse.Namespace) -> str:
     """Print the first page of a result; return the command that it ends with, for its report."""
-    from actuator_glue.report.html import Picture, Table
-
-    page = page._replace(command=as_asked(page.command, args))
-    for block in page.blocks():
-        if isinstance(block, Table):
-            table(block.caption, block.header, [[str(c) for c in r] for r in block.rows], args)
-        elif not isinstance(block, Picture):
-            say(block.text, args)
-    return page.command
+    following = as_asked(page.command, args)
+    show(page._replace(command='').blocks(), args)
+    say(f'Next: {following}', args)
+    return following

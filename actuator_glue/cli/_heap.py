@@ -29,8 +29,4 @@ def give_back(records: Sequence[Record]) -> Callable[[], None]:
             library = ctypes.CDLL(None)
             library.mallopt(_M_MMAP_THRESHOLD, _LARGE)
             return partial(library.malloc_trim, 0)
-    return _nothing
-
-
-def _nothing() -> None:
-    """Leave the heap alone."""
+    return lambda: None

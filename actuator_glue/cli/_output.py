@@ -1,18 +1,19 @@
-"""What commands write for people: lines, tables, progress."""
+"""What commands write for people: lines, tables, blocks of a report."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, add_force, make_room
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
 from actuator_glue.report.page_name import check_page_name
 
-_AN_HOUR = 3600.0  # s
+if TYPE_CHECKING:
+    from actuator_glue.report.html import Block
 
 
 def _told(text: str) -> str:
@@ -66,7 +67,7 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
             make_room(out)
         write(out)
     except (InputError, OSError) as error:
-        print(f'actuator-glue: {_told(str(error))}', file=sys.stderr)
+        fault(str(error))
         return 2
     except Exception as error:
         note(
@@ -74,6 +75,11 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
             'actuator-glue, please report it. The answer stands'
         )
     return 0
+
+
+def fault(line: str) -> None:
+    """Print what is wrong on standard error."""
+    print(f'actuator-glue: {_told(line)}', file=sys.stderr)
 
 
 def note(line: str) -> None:
@@ -111,26 +117,15 @@ def table(
     Console(file=file, highlight=False, width=max(console.width, needed)).print(shown)
 
 
-@contextmanager
-def progress(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar with time left on standard error; yields `done(amount so far)`.
+def show(blocks: Iterable[Block], args: argparse.Namespace) -> None:
+    """Print blocks of a report but its pictures; notes go to standard error."""
+    from actuator_glue.report.html import Note, Picture, Table
 
-    Nothing is drawn where standard error is no terminal.
-    """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    bar = Progress(
-        TextColumn('{task.description}'),
-        BarColumn(),
-        TextColumn('{task.percentage:>3.0f} %'),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-        speed_estimate_period=_AN_HOUR,  # shares are of the whole, so the time left is, too
-    )
-    with bar:
-        task = bar.add_task(title, total=total)
-        yield lambda amount: bar.update(task, completed=amount)
+    for block in blocks:
+        if isinstance(block, Table):
+            rows = [[str(cell) for cell in row] for row in block.rows]
+            table(block.caption, block.header, rows, args)
+        elif isinstance(block, Note):
+            note(block.text)
+        elif not isinstance(block, Picture):
+            say(block.text, args)

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Output, add_force, claim, make_room, whole
-from actuator_glue.cli._output import progress, say
+from actuator_glue.cli._output import say
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import writable
 from actuator_glue.records import Record

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Output, number, number_or_auto, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
-from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, say, show
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.api.combinations import Combinations
     from actuator_glue.records import Record
+    from actuator_glue.report.html import Table
 
 EXAMPLES = (
     'calibrate free.csv clamped.csv --stiffness 0 250e3 --save monday.npz',
@@ -127,6 +130,7 @@ def run(args: argparse.Namespace) -> int:
 
     from actuator_glue.api.calibration import calibrate
     from actuator_glue.api.calibration_options import CalibrationOptions
+    from actuator_glue.api.calibration_report import moments
 
     options = CalibrationOptions(
         effects=tuple(args.effect),
@@ -146,13 +150,12 @@ def run(args: argparse.Namespace) -> int:
         return _combinations(records, options, args)
     with progress('calibrating', args.evaluations) as done:
         found = calibrate(records, options, progress=done)
-    content = found.to_json()
-    failed = beside(args.json, lambda out: write_json(content, out))
-    failed = beside(args.save, _saving(found, args)) or failed
-    following = _show(found, args)
-    drawn = beside(args.report, lambda out: found.report(out, args.partition, following))
-    failed = drawn or failed
-    return failed or (1 if found.problems else 0)
+    known = moments(found)
+    mostly = ['prior' if p.prior_dominated else '' for p in found.parameters.values()]
+    if any(mostly):
+        rows = [(*row, text) for row, text in zip(known.rows, mostly, strict=True)]
+        known = replace(known, header=(*known.header, 'mostly'), rows=rows)
+    return _tell(found, known, found.notes, args, args.partition)
 
 
 def _combinations(
@@ -160,7 +163,7 @@ def _combinations(
 ) -> int:
     """Print what holds without a stiffness, and return the exit code."""
     from actuator_glue.api.combinations import combinations
-    from actuator_glue.api.combinations_report import HEADER, TITLE, rows
+    from actuator_glue.api.combinations_report import moments
 
     if args.partition is not None:
         raise InputError('a hybrid test cannot be judged without the specimen stiffness; give it')
@@ -171,27 +174,33 @@ def _combinations(
         )
     with progress('calibrating', args.evaluations) as done:
         found = combinations(records, options, progress=done)
+    return _tell(found, moments(found), found.notes[1:], args)
+
+
+def _tell(
+    found: Calibration | Combinations,
+    known: Table,
+    notes: Sequence[str],
+    args: argparse.Namespace,
+    *partition: str | None,
+) -> int:
+    """Write and print what was found, the answer first; return the exit code."""
+    from actuator_glue.api.tracking import tables
+
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
     failed = beside(args.save, _saving(found, args)) or failed
-    following = show_first(found.first_page(), args)
-    table(TITLE, HEADER, rows(found), args)
-    _tracking(found, args)
+    following = show_first(found.first_page(*partition), args)
+    show([known, *tables(found.tracking)], args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
-    for line in found.notes[1:]:
+    compiled = getattr(found, 'compile_seconds', 0.0)
+    if compiled > 0.5:
+        say(f'{compiled:.1f} s of compilation besides, once per installation', args)
+    for line in notes:
         note(line)
-    failed = beside(args.report, lambda out: found.report(out, following)) or failed
+    asked: tuple[Any, ...] = (*partition, following)
+    failed = beside(args.report, lambda out: found.report(out, *asked)) or failed
     return failed or (1 if found.problems else 0)
-
-
-def _tracking(found: Calibration | Combinations, args: argparse.Namespace) -> None:
-    from actuator_glue.api.tracking import HEADER, more
-    from actuator_glue.report.worst import MOST
-
-    for of in found.tracking[:MOST]:
-        table(of.title, HEADER, of.rows(), args)
-    if text := more(found.tracking):
-        note(text)
 
 
 def _saving(found: Calibration | Combinations, args: argparse.Namespace) -> Callable[[str], Path]:
@@ -230,28 +239,3 @@ def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise InputError(f'--bounds {text}: {name} has bounds already')
         out[name] = (lower, upper)
     return out
-
-
-def _show(found: Calibration, args: argparse.Namespace) -> str:
-    """Print the answer; return the command that it says to type next."""
-    from actuator_glue.api.calibration_report import (
-        HEADER,
-        moment_rows,
-        moments_title,
-    )
-
-    following = show_first(found.first_page(args.partition), args)
-    rows: list[tuple[str, ...]] = moment_rows(found)
-    columns: tuple[str, ...] = HEADER
-    mostly = ['prior' if p.prior_dominated else '' for p in found.parameters.values()]
-    if any(mostly):
-        rows = [(*row, text) for row, text in zip(rows, mostly, strict=True)]
-        columns = (*columns, 'mostly')
-    table(moments_title(found), columns, rows, args)
-    _tracking(found, args)
-    say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
-    if found.compile_seconds > 0.5:
-        say(f'{found.compile_seconds:.1f} s of compilation besides, once per installation', args)
-    for line in found.notes:
-        note(line)
-    return following

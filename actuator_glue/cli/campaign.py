@@ -10,8 +10,9 @@ import argparse
 import time
 from pathlib import Path
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, whole
-from actuator_glue.cli._output import add_json, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 from actuator_glue.report.first_lines import few

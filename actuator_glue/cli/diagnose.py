@@ -13,11 +13,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, Output, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._heap import give_back
-from actuator_glue.cli._output import add_json, add_report, beside, note, progress, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.cli._output import add_json, note, say, table
+from actuator_glue.cli._output import add_json, fault, note, say, table
 from actuator_glue.cli._records import add_records, first_of, resampling
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -67,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         except InputError as error:
             content['damage'].append(str(error))
         code = 2 if content['damage'] else code
-        for kind, tell in (('damage', _damage), ('warnings', note)):
+        for kind, tell in (('damage', fault), ('warnings', note)):
             lines, more = first_of(content[kind], 'of such lines', [path], args)
             for line in (*lines, *more):
                 tell(line)
@@ -81,10 +80,6 @@ def run(args: argparse.Namespace) -> int:
         files.append(content)
     write_json({'schema': 'actuator_glue.info/1', 'files': files}, args.json)
     return code
-
-
-def _damage(line: str) -> None:
-    print(f'actuator-glue: {line}', file=sys.stderr)
 
 
 def _stiffnesses(args: argparse.Namespace) -> list[list[Stiffness] | None]:

@@ -17,12 +17,13 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from actuator_glue import cli
+from actuator_glue import __version__, cli
 from actuator_glue.arguments import claim_outputs
+from actuator_glue.cli._output import fault
 from actuator_glue.cli._parser import Parser, examples
 from actuator_glue.cli._standard_streams import StandardStream, standard_streams
 from actuator_glue.errors import InputError
-from actuator_glue.motion import METRES, speak, spoken
+from actuator_glue.motion import METRES, speak
 
 # What a process holds at its end is not searched for garbage: that takes up to a second.
 atexit.register(gc.freeze)
@@ -72,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _run(list(sys.argv[1:] if argv is None else argv), out)
         out.flush()
         if out.fault:
-            print(f'actuator-glue: standard output: {out.fault}', file=sys.stderr)
+            fault(f'standard output: {out.fault}')
             return 2
     return code
 
@@ -93,7 +94,7 @@ def _run(argv: list[str], out: StandardStream) -> int:
         parser = build_parser(chosen)
         args = parser.parse_args(argv)
         if args.version:
-            print(f'actuator-glue {_version()}')
+            print(f'actuator-glue {__version__}')
             return 0
         if args.command is None:
             parser.print_help()
@@ -123,17 +124,8 @@ def _fail(message: str, code: int, debug: bool) -> int:
     """Tell the exception that is being handled, or raise it again where it is looked for."""
     if debug:
         raise
-    print(f'actuator-glue: {spoken(message)}', file=sys.stderr)
+    fault(message)
     return code
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version('actuator_glue')
-    except PackageNotFoundError:
-        return 'not installed (source checkout)'
 
 
 if __name__ == '__main__':

@@ -13,7 +13,8 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
-    from actuator_glue.api.calibration_result import Calibration
+    from matplotlib.figure import Figure
+
     from actuator_glue.report.bag_content import Content
 
 EXAMPLES = (
@@ -47,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
         InputError: a record cannot be used, or a picture cannot be written.
     """
     from actuator_glue.io.bag_reader import is_bag
+    from actuator_glue.report.records import record_figure
 
     folder = Path(args.out)
     try:
@@ -56,15 +58,24 @@ def run(args: argparse.Namespace) -> int:
     records = load(args)
     posterior = None
     if args.draws is not None:
+        from actuator_glue.api.calibration_report import LEVEL, bands_figure
         from actuator_glue.api.calibration_result import Calibration
 
         posterior = Calibration.load(args.draws)
-        _draw_posterior(posterior, folder / f'{Path(args.draws).stem}.{args.format}', args)
+        path = folder / f'{Path(args.draws).stem}.{args.format}'
+        told = f'{len(posterior.posterior)} draws of {args.draws}'
+        _save(posterior.plot(), path, told, args)
     for i, record in enumerate(records, start=1):
         name = f'{_stem(record)}_{i}' if len(records) > 1 else _stem(record)
-        _draw(record, claim(folder / f'{name}.{args.format}', args), args)
+        path = folder / f'{name}.{args.format}'
+        _save(record_figure(record), path, f'{len(record)} samples of {record.source}', args)
         if posterior is not None:
-            _draw_bands(posterior, record, folder / f'{name}_bands.{args.format}', args)
+            figure, inside = bands_figure(posterior, record)
+            told = (
+                f'{100 * LEVEL:.0f} % bands; the total one holds {100 * inside:.1f} % of the '
+                'samples it was made from'
+            )
+            _save(figure, folder / f'{name}_bands.{args.format}', told, args)
     for path in args.records:
         if is_bag(path):
             _draw_estimate(Path(path), folder, args)
@@ -76,32 +87,11 @@ def _stem(record: Record) -> str:
     return ''.join(c if c.isalnum() or c in '-_.' else '_' for c in name)
 
 
-def _draw(record: Record, path: Path, args: argparse.Namespace) -> None:
-    from actuator_glue.report import style
-    from actuator_glue.report.records import record_figure
-
-    style.save(record_figure(record), path)
-    say(f'{path}: {len(record)} samples of {record.source}', args)
-
-
-def _draw_posterior(found: Calibration, path: Path, args: argparse.Namespace) -> None:
+def _save(figure: Figure, path: Path, what: str, args: argparse.Namespace) -> None:
     from actuator_glue.report import style
 
-    style.save(found.plot(), claim(path, args))
-    say(f'{path}: {len(found.posterior)} draws of {args.draws}', args)
-
-
-def _draw_bands(found: Calibration, record: Record, path: Path, args: argparse.Namespace) -> None:
-    from actuator_glue.api.calibration_report import LEVEL, bands_figure
-    from actuator_glue.report import style
-
-    figure, inside = bands_figure(found, record)
     style.save(figure, claim(path, args))
-    say(
-        f'{path}: {100 * LEVEL:.0f} % bands; the total one holds {100 * inside:.1f} % of the '
-        'samples it was made from',
-        args,
-    )
+    say(f'{path}: {what}', args)
 
 
 def _draw_estimate(bag: Path, folder: Path, args: argparse.Namespace) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, number, number_or_auto, whole
-from actuator_glue.cli._output import add_json, note, progress, say, table
+from actuator_glue.cli._output import add_json, note, say, show
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
 
@@ -77,26 +78,10 @@ def run(args: argparse.Namespace) -> int:
         )
     speak(found.motion)
     write_json(found.to_json(), args.json)
-    from actuator_glue.api.replay_report import (
-        IF_TRUE,
-        TITLE,
-        TRACKING,
-        explanations_table,
-        header,
-        if_true_table,
-        rows,
-        tracking_table,
-    )
-    from actuator_glue.report import weights
+    from actuator_glue.api.replay_report import tables
     from actuator_glue.report.first_lines import first_lines
 
-    table(TITLE, header(found), rows(found), args)
-    if (followed := tracking_table(found)) is not None:
-        table(TRACKING, *followed, args)
-    if (explained := explanations_table(found)) is not None:
-        table(weights.TITLE, *explained, args)
-    if (if_true := if_true_table(found)) is not None:
-        table(IF_TRUE, *if_true, args)
+    show(tables(found), args)
     for line in (*first_lines(found.notes, 'notes'), *first_lines(found.events, 'events')):
         note(line)
     _verdict(found, args)

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, Output, number, whole
-from actuator_glue.cli._output import add_json, add_report, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, add_report, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
@@ -102,9 +103,10 @@ def run(args: argparse.Namespace) -> int:
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.api.compensation import HEADER as COMPARED
     from actuator_glue.api.compensation import compare_compensators
-    from actuator_glue.api.rths import FREQUENCIES, rths
+    from actuator_glue.api.rths import rths
     from actuator_glue.api.stability_data import limit_given
     from actuator_glue.api.stability_report import HEADER, lines, rows
+    from actuator_glue.api.tracking import FREQUENCIES
     from actuator_glue.io.ground_motion import read_ground_motion
 
     if args.limit is not None:
@@ -114,11 +116,16 @@ def run(args: argparse.Namespace) -> int:
         if motion is None:
             raise InputError('--scale needs a --ground-motion to scale')
         motion = motion.scaled(args.scale)
+    criteria: dict[str, float] = {}
+    for name, limit in args.fail or ():
+        if name in criteria:
+            raise InputError(f'--fail {name}: one limit for each; take the others out')
+        criteria[name] = limit
     calibration = Calibration.load(args.posterior)
     options = {
         'draws': args.draws,
         'frequencies': args.frequency or FREQUENCIES,
-        'criteria': dict(args.fail or ()),
+        'criteria': criteria,
         'seed': args.seed,
     }
     compared = None

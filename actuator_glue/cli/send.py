@@ -6,8 +6,9 @@ import argparse
 import time
 from dataclasses import asdict
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, number
-from actuator_glue.cli._output import add_json, note, progress, say
+from actuator_glue.cli._output import add_json, note, say
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_glue.api.bar import progress
 from actuator_glue.arguments import Input, claim, given, number, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
-from actuator_glue.cli._output import note, progress
+from actuator_glue.cli._output import note
 from actuator_glue.cli._save import add_out, check_out, save
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -105,6 +107,9 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: an option cannot be used, or the output exists or cannot be written.
     """
+    from actuator_glue.api.simulation import named_effects, simulate
+    from actuator_glue.api.visibility import unseen
+
     if args.seed < 0 or (args.command_seed or 0) < 0:
         raise InputError('seeds are whole numbers of at least 0')
     _refuse_idle(args)
@@ -113,26 +118,37 @@ def run(args: argparse.Namespace) -> int:
     sealed = out.with_name(out.name + '.truth.json')
     if args.effect:
         claim(sealed, args)
-    if args.plant == 'problem-r':
-        save(_problem_r(args), args)
-        return 0
-    records: list[Record] = []
-    command = _command(args)
+    effects = named_effects('+'.join(args.effect))
     stiffnesses = args.stiffness or [0.0]
-    with progress('simulating', len(stiffnesses)) as done:
-        for test, stiffness in enumerate(stiffnesses):
-            start = records[-1].stamp_ns(len(records[-1])) + PAUSE if records else PAUSE
-            record = _test(args, command, stiffness, test)
-            records.append(replace(record, start_ns=start, actuator=args.actuator))
-            done(test + 1)
-    save(records, args)
+    if args.plant == 'problem-r':
+        made = _problem_r(args)
+    else:
+        command = _command(args)
+        test = {'effects': effects, 'theta': args.theta, 'hold': args.hold}
+        test['sensors'] = _sensors(args)
+        made = []
+        with progress('simulating', len(stiffnesses)) as done:
+            for k in stiffnesses:
+                seed = args.seed, len(made)
+                made.append(simulate(command, stiffness=k, plant=args.plant, seed=seed, **test))
+                done(len(made))
+    save(_in_turn(made, args.actuator), args)
     if args.effect:
-        truth = _truth(args)
+        truth = _truth(args, effects)
         write_json(truth, str(sealed))
         note(f'hidden: {_hidden(truth)}; {sealed} holds it')
-        for line in _unseen(args, command, stiffnesses):
+        for line in unseen(command, stiffnesses, **test):
             note(line)
     return 0
+
+
+def _in_turn(made: Sequence[Record], actuator: str) -> list[Record]:
+    """Return tests of an actuator that follow each other."""
+    records: list[Record] = []
+    for record in made:
+        start = records[-1].stamp_ns(len(records[-1])) + PAUSE if records else PAUSE
+        records.append(replace(record, start_ns=start, actuator=actuator))
+    return records
 
 
 def _refuse_idle(args: argparse.Namespace) -> None:
@@ -148,30 +164,15 @@ def _refuse_idle(args: argparse.Namespace) -> None:
             ['--duration', '--rate'],
             '--plant problem-r, whose command is that of the paper',
         )
-        if args.shape != 'sweep':
-            raise InputError(f'--command {args.shape} does nothing with {by}; take it out')
+        usual = (('--command', args.shape, 'sweep'), ('--hold', args.hold, 'zoh'))
+        for option, value, only in usual:
+            if value != only:
+                raise InputError(f'{option} {value} does nothing with {by}; take it out')
+        if (args.force_noise_n, args.bits) != (None, None):
+            raise InputError('--force-noise-n and --bits do nothing with --plant problem-r')
     for option in _OF_COMMANDS.split():
         if given(args, option) and option not in used:
             raise InputError(f'{option} does nothing with {by}; take it out')
-    if args.plant == 'problem-r' and (args.force_noise_n, args.bits) != (None, None):
-        raise InputError('--force-noise-n and --bits do nothing with --plant problem-r')
-
-
-def _test(
-    args: argparse.Namespace, command: Command | Record, stiffness: float, test: int
-) -> Record:
-    from actuator_glue.api.simulation import simulate
-
-    return simulate(
-        command,
-        stiffness=stiffness,
-        theta=args.theta,
-        effects=_effects(args),
-        sensors=_sensors(args),
-        plant=args.plant,
-        hold=args.hold,
-        seed=(args.seed, test),
-    )
 
 
 def _sensors(args: argparse.Namespace) -> Sensors:
@@ -182,27 +183,12 @@ def _sensors(args: argparse.Namespace) -> Sensors:
     return Sensors(noise, force, args.bits)
 
 
-def _unseen(
-    args: argparse.Namespace, command: Command | Record, stiffnesses: list[float]
-) -> list[str]:
-    from actuator_glue.api.visibility import unseen
-
-    return unseen(
-        command,
-        stiffnesses,
-        _effects(args),
-        theta=args.theta,
-        sensors=_sensors(args),
-        hold=args.hold,
-    )
-
-
-def _truth(args: argparse.Namespace) -> dict[str, Any]:
+def _truth(args: argparse.Namespace, effects: Mapping[str, Any]) -> dict[str, Any]:
     """Return what is true about the plant."""
     from actuator_glue.api.simulation import sizes
     from actuator_glue.model.effects import CATALOGUE
 
-    structure, theta = sizes(_effects(args), args.theta)
+    structure, theta = sizes(effects, args.theta)
     return {
         'schema': 'actuator_glue.truth/1',
         'plant': args.plant,
@@ -235,7 +221,9 @@ def _problem_r(args: argparse.Namespace) -> list[Record]:
     from actuator_glue.model.reference_problem import NOISE, RATE, STIFFNESS, records
 
     noise = NOISE if args.noise_mm is None else args.noise_mm * 1e-3
-    made = records(args.seed, noise=noise, rate=args.rate or RATE, duration=args.duration or 60.0)
+    rate = RATE if args.rate is None else args.rate
+    duration = 60.0 if args.duration is None else args.duration
+    made = records(args.seed, noise=noise, rate=rate, duration=duration)
     wanted = args.stiffness or list(STIFFNESS)
     chosen = [r for r in made if r.stiffness in wanted]
     if len(chosen) != len(wanted) or args.effect or args.theta:
@@ -243,12 +231,7 @@ def _problem_r(args: argparse.Namespace) -> list[Record]:
             'problem-r is known for the stiffnesses 0 and 250e3 N/m, as the paper identified it; '
             'it takes no --theta and no --effect'
         )
-    starts = [PAUSE]
-    for record in chosen[:-1]:
-        starts.append(starts[-1] + record.stamp_ns(len(record)) + PAUSE)
-    return [
-        replace(r, start_ns=s, actuator=args.actuator) for r, s in zip(chosen, starts, strict=True)
-    ]
+    return chosen
 
 
 def _command(args: argparse.Namespace) -> Command | Record:
@@ -278,9 +261,3 @@ def _command(args: argparse.Namespace) -> Command | Record:
     rate = record.rate if args.rate is None else args.rate
     samples = commands.recorded(record, rate, amplitude)
     return Record(samples, samples, 1.0 / rate)
-
-
-def _effects(args: argparse.Namespace) -> dict[str, dict[str, float]]:
-    from actuator_glue.api.simulation import named_effects
-
-    return named_effects('+'.join(args.effect))

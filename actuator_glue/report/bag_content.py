@@ -1,4 +1,4 @@
-"""What a live estimator left in a bag: records, posteriors, bands, diagnoses, health."""
+"""What a live estimator left in a bag: records, posteriors, bands, health."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from actuator_glue.records import Array, Record
 
 WANTED = {
     full_name(name): name
-    for name in ('PosteriorMoments', 'PredictionBand', 'FrequencyResponseBand', 'Diagnosis')
+    for name in ('PosteriorMoments', 'PredictionBand', 'FrequencyResponseBand')
 } | {'diagnostic_msgs/msg/DiagnosticArray': 'DiagnosticArray'}
 
 
@@ -30,7 +30,6 @@ class Content:
         posteriors: PosteriorMoments in the order of their windows.
         bands: scored PredictionBands in order.
         response: the last FrequencyResponseBand, None without one.
-        diagnoses: Diagnosis messages.
         health: last values of each node on /diagnostics, by node and key.
     """
 
@@ -39,7 +38,6 @@ class Content:
     posteriors: list[Any] = field(default_factory=list)
     bands: list[Any] = field(default_factory=list)
     response: Any = None
-    diagnoses: list[Any] = field(default_factory=list)
     health: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def stitched(self, kind: str) -> Band | None:
@@ -98,8 +96,6 @@ def read(bag: Path) -> Content:
             content.bands.append(message)
         elif kind == 'FrequencyResponseBand':
             content.response = message
-        elif kind == 'Diagnosis':
-            content.diagnoses.append(message)
         elif kind == 'DiagnosticArray':
             for status in message.status:
                 values = {v.key: v.value for v in status.values}

@@ -20,16 +20,18 @@ from actuator_glue.report.style import (
     DETERMINISTIC,
     LIGHT_BAND,
     MEASURED,
+    NOISE,
+    POINTS,
     PUBLISHED,
     TOTAL,
+    legend,
     new_figure,
+    panels,
     styled,
 )
 from actuator_glue.report.worst import worst
 
 BEFORE, AFTER = DETERMINISTIC, TOTAL
-NOISE = '#dddddd'
-_POINTS = 4000  # per line: more cannot be seen
 _SECONDS = 4.0  # of each periodogram that is averaged
 _SMOOTH = 0.02  # s, so that loops are seen through the noise
 
@@ -53,15 +55,9 @@ def _title(called: Mapping[str, str], trace: Trace, width: float) -> str:
     return style.fit(called[trace.source], width, tail=tail)
 
 
-def _legend(figure: Figure, *panels: Axes, scale: float = 1.0, columns: int = 3) -> None:
-    """Put the legend of some panels below all of them, where it covers nothing."""
-    handles = [h for axes in panels for h in axes.get_legend_handles_labels()[0]]
-    figure.legend(handles=handles, loc='outside lower center', ncols=columns, markerscale=scale)
-
-
 def _lines(trace: Trace, *columns: Array) -> Array:
     """Return columns as lines to draw: not too many points, and broken at the gaps."""
-    step = max(1, len(trace.time) // _POINTS)
+    step = max(1, len(trace.time) // POINTS)
     table = np.column_stack(columns)
     gap = np.full((1, len(columns)), np.nan)
     parts = [piece for part in trace.stretches() for piece in (table[part][::step], gap)]
@@ -112,7 +108,7 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
     right.margins(y=0.15)
     right.set_ylabel('rms error [um]')
     right.set_title('all held-out data')
-    _legend(figure, left, right, columns=2)
+    legend(figure, left, right, columns=2)
     return figure
 
 
@@ -134,7 +130,7 @@ def residuals_in_time(found: DiagnosisData) -> Figure:
         axes.set_title(_title(called, trace, style.WIDTH - 0.7))
         axes.set_ylabel('residual [um]')
     grid[-1].set_xlabel('time [s]')
-    _legend(figure, grid[0])
+    legend(figure, grid[0])
     return figure
 
 
@@ -154,12 +150,8 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
     """Density of the residual of the worst records, before and after."""
     called, traces = names_of(found), worst(found.traces, _left)
     columns = min(len(traces), 2)
-    rows = -(-len(traces) // columns)
-    figure = new_figure(2.1 * rows + 0.6)
-    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-    for unused in panels[len(traces) :]:
-        unused.set_visible(False)
-    for axes, trace in zip(panels, traces, strict=False):
+    figure, grid = panels(len(traces), columns, 2.1, 0.6, sharey=True)
+    for axes, trace in zip(grid, traces, strict=True):
         for side, color in _sides(found):
             f, density = _density(trace, trace.measured - getattr(trace, side))
             axes.loglog(f, 1e6 * density, color=color, lw=0.8, label=_text(found, side))
@@ -167,9 +159,9 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
         axes.set_xlabel('frequency [Hz]')
         style.decades(axes.xaxis)
         style.decades(axes.yaxis)
-    for axes in panels[::columns]:
+    for axes in grid[::columns]:
         axes.set_ylabel(r'residual [um/$\sqrt{\mathrm{Hz}}$]')
-    _legend(figure, panels[0])
+    legend(figure, grid[0])
     return figure
 
 
@@ -206,7 +198,7 @@ def loops(found: DiagnosisData) -> Figure:
     figure = new_figure(2.1 * len(traces) + 0.4)
     grid = figure.subplots(len(traces), 2, squeeze=False)
     for (left, right), trace in zip(grid, traces, strict=True):
-        part, step = _slow_part(trace), max(1, len(trace.time) // _POINTS)
+        part, step = _slow_part(trace), max(1, len(trace.time) // POINTS)
         for side, color in _sides(found):
             simulated: Array = getattr(trace, side)
             residual = 1e6 * _smooth(trace, trace.measured - simulated)
@@ -226,7 +218,7 @@ def loops(found: DiagnosisData) -> Figure:
         right.set_xlabel('velocity [mm/s]')
         # The title of a row is as long as both panels.
         left.title.set_in_layout(False)
-    _legend(figure, grid[0, 1], scale=8)
+    legend(figure, grid[0, 1], scale=8)
     return figure
 
 
@@ -241,7 +233,7 @@ def ranking(found: DiagnosisData) -> Figure:
     axes.barh([c.name for c in shown], [1e6 * c.error for c in shown], color=colors)
     axes.axvline(1e6 * found.alarm.noise, color=MEASURED, ls='--', lw=0.8, label='noise')
     axes.set_xlabel('rms error of Eq. (2) + one effect, refitted [um]')
-    _legend(figure, axes)
+    legend(figure, axes)
     return figure
 
 
@@ -250,13 +242,8 @@ def posteriors(found: DiagnosisData) -> Figure:
     """Marginal posterior of every effect parameter."""
     estimates = {n: p for e in found.effects for n, p in e.parameters.items()}
     names = found.names[4:]
-    columns = min(len(names), 3)
-    rows = -(-len(names) // columns)
-    figure = new_figure(1.7 * rows + 0.3)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for unused in panels[len(names) :]:
-        unused.set_visible(False)
-    for axes, name, draws in zip(panels, names, found.posterior.T[4:], strict=False):
+    figure, grid = panels(len(names), min(len(names), 3), 1.7, 0.3)
+    for axes, name, draws in zip(grid, names, found.posterior.T[4:], strict=True):
         unit = estimates[name].unit if name in estimates else ''
         factor, unit = said_in(unit, draws)
         exponent = style.engineering(factor * draws)
@@ -296,9 +283,7 @@ def bands(found: DiagnosisData) -> Figure:
         lower.set_xlabel('time [s]')
     grid[0, 0].set_ylabel('displacement [mm]')
     grid[1, 0].set_ylabel('less the middle\nof the band [um]')
-    shown = [axes.get_legend_handles_labels() for axes in grid[0]]
-    named = {n: h for handles, names in shown for h, n in zip(handles, names, strict=True)}
-    figure.legend(list(named.values()), list(named), loc='outside lower center', ncols=3)
+    legend(figure, *grid[0])
     return figure
 
 

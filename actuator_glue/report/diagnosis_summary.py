@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.telling.headline import left_open
 from actuator_glue.diagnosis.telling.result import DiagnosisData
 from actuator_glue.diagnosis.verdict.rules import likely
@@ -56,18 +57,24 @@ def _range(pair: tuple[float, float], scale: float, digits: int = 1) -> str:
     return f'{scale * pair[0]:.{digits}f} to {scale * pair[1]:.{digits}f}'
 
 
+def _odds(e: Finding) -> tuple[int, list[str], int | None]:
+    """Return how sure a name is [%], its rivals with theirs, and none of them where known [%]."""
+    tied = [r for r in e.rivals if r.tied and r.name != e.name]
+    known = [e.none] if math.isfinite(e.none) else []
+    own, *rest = percents([e.probability, *(r.probability for r in tied), *known])
+    others = [f'{r.name} {share} %' for r, share in zip(tied, rest, strict=False)]
+    return own, others, rest[-1] if known else None
+
+
 def _names(found: DiagnosisData) -> list[Block]:
     """What is missing, how large it is, and how sure the name is."""
     rows = []
     for e in found.effects:
-        shown = [r for r in e.rivals if r.tied and r.name != e.name]
         sizes = ', '.join(f'{word(n)} {_estimate(p)}' for n, p in e.parameters.items())
         if math.isfinite(e.probability):
-            known = [e.none] if math.isfinite(e.none) else []
-            own, *rest = percents([e.probability, *(r.probability for r in shown), *known])
-            others = [f'{r.name} {share} %' for r, share in zip(shown, rest, strict=False)]
-            none = f'{rest[-1]} %' if known else '-'
-            rows.append([e.name, sizes, f'{own} %', ', '.join(others) or '-', none])
+            own, others, none = _odds(e)
+            left = '-' if none is None else f'{none} %'
+            rows.append([e.name, sizes, f'{own} %', ', '.join(others) or '-', left])
         else:
             rows.append([e.name, sizes, 'a description, or noise: no name', '-', '-'])
     if not rows:
@@ -105,11 +112,8 @@ def certainty(found: DiagnosisData) -> str:
     if not named:
         return inside + (' (a learned term is a description, no cause)' if found.learned else '')
     least = min(named, key=lambda e: e.probability)
-    others = [r for r in least.rivals if r.tied and r.name != least.name]
-    known = [least.none] if math.isfinite(least.none) else []
-    own, *rest = percents([least.probability, *(r.probability for r in others), *known])
-    told = [f'{r.name} {share} %' for r, share in zip(others, rest, strict=False)]
-    told += [f'none of these {rest[-1]} %'] if known else []
+    own, told, none = _odds(least)
+    told += [] if none is None else [f'none of these {none} %']
     which = f', the least sure of {len(named)} names' if len(named) > 1 else ''
     return (
         f'{own} % is the probability of the name {least.name}{which}, among all effects that were '

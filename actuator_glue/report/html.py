@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from actuator_glue import __version__
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as given_path
 from actuator_glue.motion import spoken
 from actuator_glue.report.page_name import check_page_name
 from actuator_glue.report.style import data_uri, narrowed
@@ -129,12 +130,13 @@ def render(page: Page) -> str:
     return spoken(_template('report').render(**page._asdict(), version=__version__))
 
 
-def write(path: Path, page: Page) -> Path:
+def write(path: Path | str, page: Page) -> Path:
     """Write the page to a file and return its path; errors as `render`.
 
     Raises:
-        InputError: the name says another format, or the file cannot be written.
+        InputError: no path, its name says another format, or the file cannot be written.
     """
+    path = given_path(path)
     check_page_name(path)
     text = render(page)
     try:

@@ -75,12 +75,8 @@ def curve(found: DiagnosisData, term: LearnedTerm) -> tuple[str, Array, Array]:
 def learned_terms(found: DiagnosisData) -> Figure:
     """Draw every learned term's curve with its 95 % band; one that remembers is a loop."""
     columns = min(len(found.learned), 2)
-    rows = -(-len(found.learned) // columns)
-    figure = style.new_figure(2.6 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for unused in panels[len(found.learned) :]:
-        unused.set_visible(False)
-    for axes, term in zip(panels, found.learned, strict=False):
+    figure, panels = style.panels(len(found.learned), columns, 2.6)
+    for axes, term in zip(panels, found.learned, strict=True):
         over, at, (middle, low, high) = curve(found, term)
         signal = SIGNAL[PLACES[term.place]]
         scale, unit, fine, fine_unit = _UNITS[unit_text(DIMENSIONS[signal])]

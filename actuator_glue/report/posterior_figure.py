@@ -13,9 +13,7 @@ from actuator_glue.report import style
 
 
 @style.styled
-def posterior_figure(
-    draws: Array, names: Sequence[str], units: Sequence[str], title: str = ''
-) -> Figure:
+def posterior_figure(draws: Array, names: Sequence[str], units: Sequence[str]) -> Figure:
     """Draw the marginal of every parameter and the joint density of every pair.
 
     The number in the upper half is the correlation of the pair.
@@ -24,7 +22,6 @@ def posterior_figure(
         draws: posterior draws, shape (m, p), SI units.
         names: parameter of each column, length p.
         units: their units, length p.
-        title: title of the figure.
 
     Raises:
         InputError: draws of another shape, or not finite.
@@ -61,6 +58,4 @@ def posterior_figure(
                 axes.set_xlabel(texts[j])
             if j == 0 and i > 0:
                 axes.set_ylabel(texts[i])
-    if title:
-        figure.suptitle(style.fit(title, style.WIDTH, size=10))
     return figure

@@ -44,7 +44,7 @@ def record_figure(record: Record) -> Figure:
     whole.set_xlim(0.0, record.duration)
     for axes in figure.axes:
         axes.set_xlabel('time [s]')
-    figure.legend(*whole.get_legend_handles_labels(), loc='outside lower center', ncols=2)
+    style.legend(figure, whole, columns=2)
     k = record.stiffness
     stiffness = 'not known' if k is None else f'{k / 1e3:.6g} kN/m'
     told = f': {len(record)} samples at {record.rate:.6g} Hz, specimen stiffness {stiffness}'

@@ -10,9 +10,6 @@ from matplotlib.figure import Figure
 from actuator_glue.records import Array
 from actuator_glue.report import style
 
-_POINTS = 4000  # per line: more cannot be seen
-NOISE = '#dddddd'
-
 
 class Left(NamedTuple):
     """One record: title, time (n,) [s], measured less simulated (n,) [m], rms of the noise [m]."""
@@ -32,8 +29,10 @@ def residual_figure(records: Sequence[Left], *, narrow: bool = False) -> Figure:
     for axes, of in zip(panels, records, strict=True):
         if of.noise is not None:
             wide = 2e6 * of.noise
-            axes.axhspan(-wide, wide, color=NOISE, lw=0, label='noise (2 standard deviations)')
-        some = slice(None, None, max(1, len(of.time) // _POINTS))
+            axes.axhspan(
+                -wide, wide, color=style.NOISE, lw=0, label='noise (2 standard deviations)'
+            )
+        some = slice(None, None, max(1, len(of.time) // style.POINTS))
         axes.plot(
             of.time[some],
             1e6 * of.residual[some],
@@ -44,6 +43,5 @@ def residual_figure(records: Sequence[Left], *, narrow: bool = False) -> Figure:
         axes.set_title(style.fit(of.title, width - 0.7))
         axes.set_ylabel('residual [um]')
     panels[-1].set_xlabel('time [s]')
-    handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=2)
+    style.legend(figure, panels[0], columns=2)
     return figure

@@ -13,6 +13,8 @@ from typing import Any, ParamSpec, TypeVar
 
 import matplotlib.style
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -27,6 +29,7 @@ from actuator_glue.motion import spoken, spoken_of
 P = ParamSpec('P')
 R = TypeVar('R')
 
+POINTS = 4000  # of a line: more cannot be seen
 STYLE_FILE = Path(__file__).with_name('actuator_glue.mplstyle')
 WIDTH = 7.2  # in, the text width of an A4 page
 NARROW = 4.2  # in, of a phone
@@ -41,6 +44,7 @@ TOTAL = '#009E73'
 TRUTH = '#009E73'
 WARNING = '#CC79A7'
 PUBLISHED = '#E69F00'
+NOISE = '#dddddd'
 
 # How symbols are written in figures.
 SYMBOL = {
@@ -138,6 +142,43 @@ def new_figure(height: float, width: float = WIDTH, *, motion: str | None = None
     figure = Drawing(figsize=(width, height), layout='constrained')
     figure.motion = spoken_of() if motion is None else motion
     return figure
+
+
+def panels(
+    count: int, columns: int, height: float, rest: float = 0.0, **shared: Any
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with so many panels, row by row; call it from a `styled` function.
+
+    Args:
+        count: of panels.
+        columns: in which they stand.
+        height: of a row [in].
+        rest: of the height, for legend and title [in].
+        shared: axes that they share, as `Figure.subplots` takes them.
+    """
+    rows = -(-count // columns)
+    figure = new_figure(height * rows + rest)
+    grid = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
+    for unused in grid[count:]:
+        unused.set_visible(False)
+    return figure, [*grid[:count]]
+
+
+def legend(figure: Figure, *panels: Axes, columns: int = 3, scale: float = 1.0) -> None:
+    """Put the legend of some panels below all of them, where it covers nothing; a name is once.
+
+    Args:
+        figure: of the panels.
+        panels: whose curves are named.
+        columns: of the legend.
+        scale: of its markers, over those in the panels.
+    """
+    named: dict[str, Artist] = {}
+    for axes in panels:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(str(name), handle)
+    marks, texts = named.values(), named.keys()
+    figure.legend(marks, texts, loc='outside lower center', ncols=columns, markerscale=scale)
 
 
 @styled

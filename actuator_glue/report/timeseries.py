@@ -228,13 +228,9 @@ def parameters_against_time(
     count = len(parameters)
     course.check(count)
     time_s, mean, lower, upper = course.time_s, course.mean, course.lower, course.upper
-    columns = 2 if count > 1 else 1
-    rows = -(-count // columns)
-    figure = style.new_figure(0.7 + 1.7 * rows)
-    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for unused in panels[count:]:
-        unused.set_visible(False)
-    for i, (axes, parameter) in enumerate(zip(panels, parameters, strict=False)):
+    columns = min(count, 2)
+    figure, panels = style.panels(count, columns, 1.7, 0.7, sharex=True)
+    for i, (axes, parameter) in enumerate(zip(panels, parameters, strict=True)):
         dominated = prior_dominated is not None and bool(prior_dominated[i])
         colour = style.COMMAND if dominated else style.BAND
         exponent = style.engineering(mean[:, i], lower[:, i], upper[:, i])
@@ -248,7 +244,7 @@ def parameters_against_time(
         note = ', little more than the prior' if dominated else ''
         axes.set_title(style.label(parameter.name, parameter.unit, exponent) + note)
         axes.tick_params(labelbottom=i >= count - columns)
-    for axes in panels[max(0, count - columns) : count]:
+    for axes in panels[-columns:]:
         axes.set_xlabel('time [s]')
     _caption(figure, panels[0], title)
     return figure
@@ -256,8 +252,7 @@ def parameters_against_time(
 
 def _caption(figure: Figure, axes: Axes, title: str) -> None:
     """Put the legend of a panel below all of them, and a title above."""
-    handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=3)
+    style.legend(figure, axes)
     if title:
         figure.suptitle(style.fit(title, style.WIDTH, size=10))
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import messages
@@ -65,15 +64,6 @@ def spells(course: Sequence[tuple[float, Mapping[str, float]]]) -> list[Spell]:
     return found
 
 
-def named(posterior: Any) -> dict[str, float]:
-    """Return name and weight of each structure of a PosteriorMoments; older ones know of one.
-
-    Raises:
-        InputError: not as many weights as structures.
-    """
-    return dict(structure_weights(posterior))
-
-
 def of_bag(path: Path | str) -> dict[str, list[tuple[float, dict[str, float]]]]:
     """Return what live estimators carried: by topic, ends of windows [s] and weights.
 
@@ -87,7 +77,7 @@ def of_bag(path: Path | str) -> dict[str, list[tuple[float, dict[str, float]]]]:
         with suppress(InputError, ValueError):
             told = deserialize(one.type, one.data, one.definition)
             end = (int(told.index) + int(told.samples)) * float(told.period)
-            found.setdefault(one.topic, []).append((end, named(told)))
+            found.setdefault(one.topic, []).append((end, dict(structure_weights(told))))
     return found
 
 

@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from actuator_glue.online.stream import structure_effects
+from actuator_glue.online.stream import structure_effects, structure_weights
 from actuator_glue.report import experiments
 from actuator_glue.report.quantity import said_in
-from actuator_glue.report.weights import named
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ def explanations(posterior: Any) -> list[Explanation]:
     Raises:
         InputError: not as many weights as structures.
     """
-    weights = named(posterior)
+    weights = structure_weights(posterior)
     sizes = list(getattr(posterior, 'structure_sizes', ())) or [0] * len(weights)
     columns = [
         said(*one)
@@ -74,7 +73,7 @@ def explanations(posterior: Any) -> list[Explanation]:
         )
     ]
     found, start = [], 0
-    for (name, weight), size in zip(weights.items(), sizes, strict=False):
+    for (name, weight), size in zip(weights, sizes, strict=False):
         own = tuple(columns[start : start + int(size)])
         found.append(Explanation(name, weight, own))
         start += int(size)

@@ -120,11 +120,6 @@ class Frames:
         return b''.join([struct.pack('<I', len(text)), text, *packed])
 
 
-def frame(intake: Intake, wanted: Wanted) -> bytes:
-    """Return what a page is to show first."""
-    return Frames(intake).next(wanted, 0.0)
-
-
 def _key(history: History, place: int) -> tuple[int, ...]:
     """Return what trends and log depend on at a place."""
     trends, log = history.trends, history.log

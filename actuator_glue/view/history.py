@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -139,15 +141,14 @@ class History:
         text = json.dumps(content).encode()
         place = self.measured_to if place is None else place
         self.known_to = max(self.known_to, place)
-        after = 0  # events that became known later, though they came before
-        while after < len(events) and events[-1 - after][0] > place:
-            after += 1
-        if after < len(events) and events[-1 - after][1] == text:
+        # Before events that became known later, though they came before.
+        at = bisect_right(events, place, key=itemgetter(0))
+        if at and events[at - 1][1] == text:
             return
-        if after:
-            events.insert(len(events) - after, (place, text))
-        else:
-            events.append((place, text))
+        if len(events) == events.maxlen:
+            events.popleft()
+            at = max(at - 1, 0)
+        events.insert(at, (place, text))
         while len(events) > 1 and events[1][0] <= self.oldest:
             events.popleft()
         self.version += 1

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import insort
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 _MOST = 500  # entries that are kept
@@ -155,9 +157,7 @@ class Logbook:
 
     def _add(self, made: Entry) -> None:
         self.version += 1
-        after = 0  # what became known later, though it came before
-        while after < len(self._entries) and self._entries[-1 - after].place > made.place:
-            after += 1
         if len(self._entries) == _MOST:
             self._entries.popleft()
-        self._entries.insert(len(self._entries) - after, made)
+        # Before what became known later, though it came before.
+        insort(self._entries, made, key=attrgetter('place'))

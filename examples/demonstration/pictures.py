@@ -15,11 +15,10 @@ from actuator_glue.diagnosis.verdict.traces import Trace
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import BASE
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.stream import structure_effects, structure_name
+from actuator_glue.online.stream import structure_effects, structure_name, structure_weights
 from actuator_glue.records import Array
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
-from actuator_glue.report.weights import named
 
 UM = 1e6
 MM = 1e3
@@ -92,7 +91,7 @@ def explanations(content: Content, path: Path, hidden: Sequence[str]) -> Path:
     """
     first, posteriors = content.record.first_index, content.posteriors
     time = [(int(p.index) + int(p.samples) - first) * float(p.period) for p in posteriors]
-    told = [named(p) for p in posteriors]
+    told = [dict(structure_weights(p)) for p in posteriors]
     true = next((name for one in told for name in one if _is(name, hidden)), '')
     plain = structure_name(())
     names = list(dict.fromkeys([true] * bool(true) + [n for one in told for n in one]))

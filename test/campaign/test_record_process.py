@@ -12,15 +12,15 @@ import pytest
 
 from actuator_glue.campaigns.grouping import Task, tasks_of
 from actuator_glue.campaigns.recipe import Recipe
-from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess
+from actuator_glue.campaigns.record_process import RecordProcess
 
-LIMITS = RecordLimits(20.0, 1.0)
+SECONDS, MEMORY = 20.0, 1.0
 
 
 @pytest.fixture
 def process() -> Iterator[RecordProcess]:
     """A process of the tiny analysis."""
-    found = RecordProcess('tiny_analysis:tiny', LIMITS.memory_gb)
+    found = RecordProcess('tiny_analysis:tiny', MEMORY)
     yield found
     found.close()
 
@@ -36,12 +36,12 @@ def test_every_end_is_a_row_with_its_reason(process: RecordProcess, tmp_path: Pa
     """Signal, exit, memory, fault, refusal; the next record has a process all the same."""
 
     def failure(text: str) -> str:
-        return str(process.row(task(tmp_path, text), tmp_path, 'k', LIMITS).get('failure'))
+        return str(process.row(task(tmp_path, text), tmp_path, 'k', SECONDS).get('failure'))
 
-    first = process.row(task(tmp_path, 'well'), tmp_path, 'k', LIMITS)
+    first = process.row(task(tmp_path, 'well'), tmp_path, 'k', SECONDS)
     assert first['size'] == 4 and first['threads'] == '1'
     assert failure('crash') == 'its process was ended by signal 11 SIGSEGV'
-    second = process.row(task(tmp_path, 'again'), tmp_path, 'k', LIMITS)
+    second = process.row(task(tmp_path, 'again'), tmp_path, 'k', SECONDS)
     assert second['size'] == 5 and second['process'] != first['process']
     assert failure('leave') == 'its process ended with status 3'
     assert failure('memory 2') == 'needs more than 1 GB of memory'
@@ -52,12 +52,12 @@ def test_every_end_is_a_row_with_its_reason(process: RecordProcess, tmp_path: Pa
 
 def test_a_record_has_so_much_time(process: RecordProcess, tmp_path: Path) -> None:
     """And no more; the next one begins at once."""
-    process.row(task(tmp_path, 'well'), tmp_path, 'k', LIMITS)
+    process.row(task(tmp_path, 'well'), tmp_path, 'k', SECONDS)
     begin = time.monotonic()
-    row = process.row(task(tmp_path, 'sleep 60'), tmp_path, 'k', RecordLimits(0.3, 1.0))
+    row = process.row(task(tmp_path, 'sleep 60'), tmp_path, 'k', 0.3)
     assert row == {'failure': 'took longer than 0.3 s'}
     assert time.monotonic() - begin < 50.0  # not the 60 s; the limit is in what it says
-    assert process.row(task(tmp_path, 'well'), tmp_path, 'k', LIMITS)['size'] == 4
+    assert process.row(task(tmp_path, 'well'), tmp_path, 'k', SECONDS)['size'] == 4
 
 
 def test_it_ends_with_its_parent(tmp_path: Path) -> None:
@@ -69,10 +69,10 @@ def test_it_ends_with_its_parent(tmp_path: Path) -> None:
         'from pathlib import Path\n'
         'from actuator_glue.campaigns.grouping import tasks_of\n'
         'from actuator_glue.campaigns.recipe import Recipe\n'
-        'from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess\n'
+        'from actuator_glue.campaigns.record_process import RecordProcess\n'
         f'task = tasks_of([{str(path)!r}], Recipe())[0]\n'
         'process = RecordProcess("tiny_analysis:tiny", 1.0)\n'
-        f'order = (task, Path({str(tmp_path)!r}), "k", RecordLimits(99.0, 1.0))\n'
+        f'order = (task, Path({str(tmp_path)!r}), "k", 99.0)\n'
         'threading.Thread(target=process.row, args=order, daemon=True).start()\n'
         'while process._process is None: time.sleep(0.01)\n'
         'print(process._process.pid, flush=True)\n'

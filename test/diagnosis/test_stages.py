@@ -97,7 +97,6 @@ def test_a_callback_that_fails_is_told_once() -> None:
         raise KeyError(stage)
 
     safe = harmless(tell)
-    assert safe is not None and harmless(None) is None
     with pytest.warns(RuntimeWarning, match="KeyError.'check'"):
         safe('check', 0.0)
     safe('base fit', 0.0)
@@ -107,7 +106,6 @@ def test_a_callback_that_fails_is_told_once() -> None:
         raise KeyboardInterrupt
 
     stop = harmless(interrupted)
-    assert stop is not None
     with pytest.raises(KeyboardInterrupt):
         stop(0.0)
 

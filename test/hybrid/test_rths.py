@@ -240,6 +240,10 @@ def test_the_command_line_decides(tmp_path: Path, capsys: pytest.CaptureFixture[
             assert found['go'] == (code == 0) and (('NO-GO' in said) == (code == 1))
         assert f'P(unstable) = {found["p_unstable"]["value"]:.4g}' in said
     assert main(['rths', 'sdof', '--posterior', str(path), '--limit', '2']) == 2
+    twice = ['--fail', 'drift=0.1', '--fail', 'force=5', '--fail', 'drift=0.2']
+    shaken = ['rths', 'sdof', '--posterior', str(path), '--ground-motion', 'artificial']
+    assert main([*shaken, *twice]) == 2
+    assert '--fail drift: one limit' in capsys.readouterr().err
 
 
 def test_a_record_too_short_for_slow_growth_is_no_go() -> None:

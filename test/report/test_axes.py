@@ -9,12 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import actuator_glue as ag
+from actuator_glue.api.bode_figure import bode_figure
+from actuator_glue.api.frequency_response import FrequencyResponse, Limits, MeasuredResponse
 from actuator_glue.inference.bands import band
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report import style
-from actuator_glue.report.bode_figure import Bode, bode
 from actuator_glue.report.posterior_figure import posterior_figure
-from actuator_glue.report.prediction_figure import Predicted, prediction_figure
+from actuator_glue.report.prediction_figure import prediction_figure
 from actuator_glue.report.records import record_figure
 from actuator_glue.report.residual_figure import Left, residual_figure
 from actuator_glue.report.timeseries import (
@@ -31,17 +32,18 @@ RECORD = ag.Record(SINE, 0.9 * SINE, 0.01, 250e3)
 DRAWS = np.random.default_rng(1).normal(1.0, 0.01, (50, 4))
 
 
-def limits(of: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def limits(of: np.ndarray) -> Limits:
     """Return a median with a band."""
-    return of, 0.9 * of, 1.1 * of
+    return Limits(of, 0.9 * of, 1.1 * of)
 
 
 def bode_of() -> Figure:
     """Return a response with a measured one."""
     hertz = np.geomspace(0.1, 10.0, 30)
-    seen = (hertz, 0.8 / hertz, -10.0 * hertz)
-    one = Bode('free', hertz, limits(1 / hertz), limits(-9 * hertz), limits(0.02 / hertz), seen)
-    return bode([one, one])
+    seen = MeasuredResponse(hertz, 0.8 / hertz, -10.0 * hertz)
+    curves = (limits(1 / hertz), limits(-9 * hertz), limits(0.02 / hertz))
+    one = FrequencyResponse(hertz, *curves, 0.0, measured=seen)
+    return bode_figure([('free', one), ('free', one)])
 
 
 def course() -> Figure:
@@ -61,7 +63,7 @@ def zooms() -> Figure:
 PICTURES: dict[str, Callable[[], Figure]] = {
     'bode': bode_of,
     'prediction': lambda: prediction_figure(
-        Predicted(T, SINE, 0.9 * SINE, 0.9 * SINE, (0.8 * SINE, SINE), (0.85 * SINE, SINE))
+        T, SINE, 0.9 * SINE, (0.8 * SINE, SINE), (0.85 * SINE, SINE), 0.9 * SINE
     ),
     'residual': lambda: residual_figure([Left('a', T, SINE, 1e-3), Left('b', T, SINE, None)]),
     'posterior': lambda: posterior_figure(DRAWS, [p.name for p in BASE], [p.unit for p in BASE]),

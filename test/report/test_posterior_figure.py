@@ -15,7 +15,7 @@ def test_every_pair_is_there_and_nothing_overlaps(overlapping_texts) -> None:
     rng = np.random.default_rng(0)
     draws = np.array([133.0, 1.1e9, 2.5e5, 6e-5]) * (1 + 0.01 * rng.standard_normal((2000, 4)))
     draws[:, 1] = 8e6 * draws[:, 0]
-    figure = posterior_figure(draws, NAMES, UNITS, 'a_long_name_of_a_record' * 10)
+    figure = posterior_figure(draws, NAMES, UNITS)
     texts = [t.get_text() for axes in figure.axes for t in axes.texts]
     assert len(figure.axes) == 16
     assert len(texts) == 6

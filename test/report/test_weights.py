@@ -8,6 +8,7 @@ import pytest
 
 from actuator_glue.errors import InputError
 from actuator_glue.online import conversion
+from actuator_glue.online.stream import structure_weights
 from actuator_glue.report import weights
 from actuator_glue.report.weights import Spell, spells
 
@@ -61,7 +62,7 @@ def test_weights_that_do_not_belong_to_the_structures_are_refused(shares: list[f
     """Whose weight it is would be a guess; one structure of old is not asked for any."""
     message = Message(structures=['Eq. (2)', 'backlash'], weights=shares, window=7)
     with pytest.raises(InputError, match=f'window 7: {len(shares)} weights of 2 structures'):
-        weights.named(message)
+        structure_weights(message)
     with pytest.raises(InputError, match='weights of 2 structures'):
         conversion.weights(message)
-    assert weights.named(Message(effects=['play'])) == {'play': 1.0}
+    assert structure_weights(Message(effects=['play'])) == [('play', 1.0)]

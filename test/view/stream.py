@@ -6,10 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.view.frames import Frames, Wanted
 from actuator_glue.view.history import History
 from actuator_glue.view.intake import Intake
 
 RATE = 1000.0
+
+
+def frame(intake: Intake, wanted: Wanted) -> bytes:
+    """Return what a page is shown first."""
+    return Frames(intake).next(wanted, 0.0)
 
 
 def block(first: int, count: int) -> Any:

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype
+from stream import frame
 
 from actuator_glue.io import messages
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.remarks import Note, refuse
-from actuator_glue.view.frames import Wanted, frame
+from actuator_glue.view.frames import Wanted
 from actuator_glue.view.history import ROWS
 from actuator_glue.view.intake import Intake, read_bag
 from actuator_glue.view.timeline import LONGEST_GAP, Timeline

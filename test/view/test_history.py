@@ -12,13 +12,14 @@ from stream import (
     carried,
     diagnosis,
     feed,
+    frame,
     intake,
     posterior,
     setup,
 )
 
 from actuator_glue.errors import InputError
-from actuator_glue.view.frames import Frames, Wanted, frame, parse_wanted
+from actuator_glue.view.frames import Frames, Wanted, parse_wanted
 from actuator_glue.view.history import ROWS, History
 from actuator_glue.view.timeline import Timeline
 

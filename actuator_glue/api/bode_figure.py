@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from actuator_glue.records import Array
+from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.report import style
 from actuator_glue.report.timeseries import TOP
 
-Band = tuple[Array, Array, Array]  # median, lower, upper
-
-
-class Bode(NamedTuple):
-    """One response: title, frequency [Hz], gain, phase [degrees], delay [s]; and the measured one.
-
-    Attributes:
-        measured: frequency [Hz], gain and phase [degrees]; None for none.
-    """
-
-    title: str
-    frequency: Array
-    gain: Band
-    phase: Band
-    delay: Band
-    measured: tuple[Array, Array, Array] | None
-
 
 @style.styled
-def bode(responses: Sequence[Bode]) -> Figure:
-    """Draw responses side by side."""
+def bode_figure(responses: Sequence[tuple[str, FrequencyResponse]]) -> Figure:
+    """Draw responses side by side, each under its title."""
     count = len(responses)
     figure = style.new_figure(5.4)
     grid = figure.subplots(3, count, sharex='col', sharey='row', squeeze=False)
-    for column, of in zip(grid.T, responses, strict=True):
+    for column, (title, of) in zip(grid.T, responses, strict=True):
         scaled = (of.gain, of.phase, tuple(1e3 * edge for edge in of.delay))
         for axes, (median, lower, upper) in zip(column, scaled, strict=True):
             axes.fill_between(
@@ -58,7 +40,7 @@ def bode(responses: Sequence[Bode]) -> Figure:
                     zorder=TOP,
                     label='measured',
                 )
-        column[0].set_title(style.fit(of.title, style.WIDTH / count - 0.5))
+        column[0].set_title(style.fit(title, style.WIDTH / count - 0.5))
         column[-1].set_xlabel('frequency [Hz]')
         style.decades(column[-1].xaxis)
         low, high = of.frequency[[0, -1]]
@@ -66,10 +48,5 @@ def bode(responses: Sequence[Bode]) -> Figure:
             column[-1].set_xlim(low, high)
     for axes, text in zip(grid[:, 0], ('gain [-]', 'phase [degrees]', 'delay [ms]'), strict=True):
         axes.set_ylabel(text)
-    named = {
-        name: handle
-        for axes in grid[0]
-        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(list(named.values()), list(named), loc='outside lower center', ncols=3)
+    style.legend(figure, *grid[0])
     return figure
