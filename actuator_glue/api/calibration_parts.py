@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.frame import frame
+from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import moments
 from actuator_glue.json_value import json_value
 from actuator_glue.model.force_errors import transducer
@@ -29,8 +30,8 @@ class Marginal:
     Attributes:
         mean, stddev, skewness: moments of the draws.
         cov: coefficient of variation, stddev / |mean|.
-        rhat: rank-normalised split R-hat (Vehtari et al. 2021), by arviz.
-        ess: bulk effective sample size, by arviz.
+        rhat: rank-normalised split R-hat (Vehtari et al. 2021).
+        ess: bulk effective sample size (the same paper).
         best: value of the draw of the highest likelihood.
         unit: SI unit.
         bounds: of the uniform prior.
@@ -60,13 +61,9 @@ def marginals(
         units: unit of each parameter by name, in the order of the draws.
         bounds: of their uniform priors; infinite where there is none.
     """
-    import arviz as az
-
     lower, upper = np.transpose(bounds)
     told = moments(draws.reshape(-1, draws.shape[-1]), lower, upper)
-    # arviz wants (chain, draw, parameter).
-    data = az.convert_to_dataset({'theta': np.swapaxes(draws, 0, 1)})
-    rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
+    rhat, ess = rhat_and_ess(draws)
     return {
         name: Marginal(
             mean=float(told.mean[i]),
