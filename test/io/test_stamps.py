@@ -9,6 +9,7 @@ import pytest
 
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
+from actuator_glue.io.formats.delimited import seconds_of
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.look import look
 
@@ -150,3 +151,26 @@ def test_an_index_of_times_as_pandas_writes_it(
     record = read(tmp_path / 'a.csv')
     start = first + (DAY if days is None else 0)
     assert (record.period, record.start_ns) == (5e-3, start * 10**9)
+
+
+@pytest.mark.parametrize(
+    'written',
+    [
+        '2026-{2:02d}-{3:02d} {0:02d}:{1:02d}:{1:02d}.{4:06d}',
+        '2026-{2:02d}-{3:02d}T{0:02d}:{1:02d}:{1:02d}',
+        '{0:02d}:{1:02d}:{1:02d}.{4:09d}',
+        '{0:d}:{1:02d}:{1:02d}',
+        '{3:02d}.{2:02d}.2026 {0:02d}:{1:02d}:{1:02d},{4:06d}',
+    ],
+)
+def test_stamps_read_at_once_are_the_same_to_the_bit(written: str) -> None:
+    """Impossible ones among them, which are no times: hour 24, second 60."""
+    rng = np.random.default_rng(4)
+    tops = (25, 61, 13, 29, 1_000_000)
+    drawn = np.column_stack([rng.integers(k in (2, 3), top, 500) for k, top in enumerate(tops)])
+    entries = [written.format(*row) for row in drawn.tolist()]
+    possible = [e for e, row in zip(entries, drawn, strict=True) if row[0] < 24 and row[1] < 60]
+    for some in (entries, possible):
+        one_by_one = seconds_of([*some, '1:00:00 pm'])[:-1]  # not written as the others are
+        np.testing.assert_array_equal(seconds_of(some), one_by_one)
+    assert np.isfinite(seconds_of(possible)).all()

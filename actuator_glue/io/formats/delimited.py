@@ -49,6 +49,8 @@ _STAMP = re.compile(
     r'(?: ?(?P<half>[ap])\.?m\.?)?(?: ?(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d))?',
     re.ASCII | re.IGNORECASE,
 )
+# The same in ISO 8601, without a zone.
+_ISO = re.compile(r'(?:(?:19[7-9]\d|20\d\d)-\d\d-\d\d[T ])?\d\d:\d\d:\d\d(?:\.\d{1,9})?', re.ASCII)
 _ZERO = re.compile(r'[.,]\d*0(?:e|$)', re.IGNORECASE)  # a number written with all its digits
 # What parts names with blanks within them, as in `Time [s]  Command [mm]`.
 _BLANKS, _NO_BRACKET = re.compile(r'\s{2,}'), re.compile(r'\s+(?![\[(\s])')
@@ -424,6 +426,23 @@ def _seconds(entry: str) -> float:
     return passed + whole.timestamp() + float(f'0.{stamp["fraction"] or 0}')
 
 
+def seconds_of(entries: list[str]) -> Array:
+    """Return the seconds that entries stamp, shape (n,); NaN for what is no stamp.
+
+    They are read at once where all are written alike, as ISO 8601 without a zone.
+    """
+    alike = len(set(map(len, entries))) == 1 and all(map(_ISO.fullmatch, entries))
+    day = '' if '-' in entries[0] else '1970-01-01T'
+    try:
+        times = np.array([day + entry for entry in entries if alike], dtype='datetime64[ns]')
+    except ValueError:  # 25:00:00
+        alike = False
+    if not alike:
+        return np.array(list(map(_seconds, entries)))
+    whole = times.astype('datetime64[s]')
+    return np.asarray(whole.astype(np.float64) + (times - whole).astype(np.float64) / 1e9)
+
+
 def fields_of(line: str, delimiter: str | None) -> list[str]:
     """Return the entries of a line without the quotes about them."""
     if not line.strip(_NOTHING):
@@ -551,8 +570,11 @@ def _block(
         InputError: a row has more or fewer entries than the first of the file.
     """
     delimiter, lines = head.delimiter, [line for _, line in block]
-    plain = head.decimal == '.' and (delimiter is None or len(delimiter) == 1)
+    plain = delimiter is None or len(delimiter) == 1
     plain = plain and not head.stamps.intersection(positions)
+    if plain and head.decimal == ',':  # with a point in it an entry is no number
+        plain = delimiter != ',' and not any('.' in line for line in lines)
+        lines = [line.replace(',', '.') for line in lines] if plain else lines
     if plain and not any('"' in line for line in lines):
         _check_widths(
             path,
@@ -570,13 +592,11 @@ def _block(
             pass  # an entry is no number: it is found below
         else:
             return [np.array(column) for column in table.T]
-    rows = [fields_of(line, delimiter) for line in lines]
+    rows = [fields_of(line, delimiter) for _, line in block]
     _check_widths(path, head, block, [len(row) for row in rows])
     entries = [[row[at] if at < len(row) else '' for row in rows] for at in positions]
     return [
-        np.array(list(map(_seconds, column)))
-        if at in head.stamps
-        else _numbers(column, head.decimal)
+        seconds_of(column) if at in head.stamps else _numbers(column, head.decimal)
         for at, column in zip(positions, entries, strict=True)
     ]
 
