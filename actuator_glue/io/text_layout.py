@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,6 +33,14 @@ class _Rows(NamedTuple):
     delimiter: str | None
     numbers: list[int]
     filled: int  # columns that are not empty
+
+    def plain(self) -> re.Pattern[str]:
+        """Return what a line matches whose entries are all numbers, which most lines are."""
+        sign = r'\.' if self.delimiter == ',' else '[.,]'
+        number = rf'[+-]?(?:\d+{sign}?\d*|{sign}\d+)(?:[ed][+-]?\d+)?'
+        parted = '[ \t]+' if self.delimiter is None else f' *{re.escape(self.delimiter)} *'
+        row = parted.join([number] * (self.numbers[-1] + 1))
+        return re.compile(f' *{row}[ \r\n]*', re.ASCII | re.IGNORECASE)
 
 
 class SampleRows(NamedTuple):
@@ -88,9 +97,14 @@ def _blocks(path: Path, like: _Rows, *, is_timed: bool) -> tuple[list[SampleRows
     found: list[SampleRows] = []
     above: list[tuple[int, list[str]]] = []
     first, rows, empty, follows, last = 0, 0, 0, False, ''
+    plain = like.plain()
     with open_text(path, errors='replace') as file:
         for at, line in enumerate(file):
             if at < like.first - _ABOVE:
+                continue
+            if rows and plain.fullmatch(line):
+                rows += 1 + empty
+                empty = 0
                 continue
             entries = fields_of(line.rstrip('\r\n'), like.delimiter)
             if not any(entries):
