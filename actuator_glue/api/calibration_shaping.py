@@ -151,7 +151,7 @@ def _half(data: Data, found: Fit, which: slice) -> float:
     rows = zip(data.records[which], data.masks[which], strict=True)
     return 0.5 * effective_size(
         [found.error[part] for part in parts],
-        [found.jacobian[:, part] for part in parts],
+        [found.jacobian_of(part) for part in parts],
         [(record.command[mask], record.measured[mask]) for record, mask in rows],
     )
 

@@ -52,7 +52,7 @@ def effective_size(
     power = sum(float(((e - mean) ** 2).sum()) for e in errors) / count
     if not (np.isfinite(power) and power > 0.0):
         raise InputError('the residual has no spread: its autocorrelation says nothing; give G')
-    basis = _basis(np.concatenate([*slopes], axis=1))
+    basis = _basis(slopes[0] if len(slopes) == 1 else np.concatenate([*slopes], axis=1))
     if not len(basis):
         return float(count)
     loud, again, begin = 0.0, 0.0, 0
@@ -61,7 +61,11 @@ def effective_size(
         begin += len(e)
         density = np.abs(np.fft.fft(e - mean)) ** 2 / len(e)
         density = scipy.ndimage.uniform_filter1d(density, min(_BAND, len(e)), mode='wrap')
-        loud += float((np.abs(np.fft.fft(part)) ** 2 @ density).sum()) / len(e)
+        acts = np.empty_like(part)  # of long records the spectra of all would fill the memory
+        for row, out in zip(part, acts, strict=True):
+            np.square(np.abs(np.fft.fft(row)), out=out)
+        loud += float((acts @ density).sum()) / len(e)
+        del acts
         if motions:
             stretch, rounding = _rounding(e - mean, *motions[i])
             again += rounding * float((part[:, stretch] ** 2).sum())
@@ -73,8 +77,9 @@ def effective_size(
 def _basis(slopes: Array) -> Array:
     """Return orthonormal rows that span slopes (p, n) less their means, without what is tied."""
     rows = slopes - slopes.mean(axis=1, keepdims=True)
-    size = np.sqrt((rows**2).sum(axis=1))
-    rows = rows[size > 0.0] / size[size > 0.0, None]
+    size = np.sqrt([(row**2).sum() for row in rows])
+    rows, size = (rows, size) if (size > 0.0).all() else (rows[size > 0.0], size[size > 0.0])
+    rows /= size[:, None]
     if not len(rows):
         return np.empty((0, slopes.shape[1]))
     values, turn = np.linalg.eigh(rows @ rows.T)

@@ -89,7 +89,7 @@ def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array
     """
     data, past = features.data, features.past
     products = features.products(scorer, fit)
-    own, names = len(fit.jacobian), features.names
+    own, names = len(fit.slopes), features.names
     counts = np.zeros(_FOLDS)
     for fold, block, _, _ in _blocks(data, scorer):
         counts[fold] += block.stop - block.start
@@ -113,8 +113,9 @@ def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array
     fold_of = np.empty(fit.error.size, dtype=np.intp)
     for fold, block, record, at in _blocks(data, scorer):
         fold_of[block] = fold
-        before[block] -= few[fold] @ fit.jacobian[:, block]
-        after[block] -= weights[fold, :own] @ fit.jacobian[:, block]
+        slopes = fit.jacobian_of(block)
+        before[block] -= few[fold] @ slopes
+        after[block] -= weights[fold, :own] @ slopes
         columns = past.columns(record, own + len(names))
         after[block] -= weights[fold, columns] @ past.rows(record, past.motions[record], at)
     for i, name, feature in features.library():

@@ -116,7 +116,7 @@ class Scorer:
         total, moves = 0.0, self.moves(fit, *_plain(fit), self.blocks)
         for block, move in zip(self.blocks, moves, strict=True):
             e = fit.error[block]
-            left = e - move @ fit.jacobian[:, block]
+            left = e - move @ fit.jacobian_of(block)
             total += min(float(left @ left), 4.0 * float(e @ e))
         return max(float(np.sqrt(total / len(fit.error))), fit.rms)
 

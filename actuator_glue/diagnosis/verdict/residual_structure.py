@@ -212,7 +212,7 @@ def _noise(data: Data, structure: Structure, found: Fit) -> Array:
     sizes = [part.stop - part.start for part in data.parts]
     noise = np.array([s.noise for s in splits])
     worth = effective_size(
-        [found.error[p] for p in data.parts], [found.jacobian[:, p] for p in data.parts]
+        [found.error[p] for p in data.parts], [found.jacobian_of(p) for p in data.parts]
     )
     if worth < _WHITE * found.error.size and not _plain(found, noise, sizes):
         scorer = Scorer.of(data, splits)

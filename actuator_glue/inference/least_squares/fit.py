@@ -30,6 +30,7 @@ _STRAIGHT = 0.01  # of the squared motion between two starts may be nonlinear
 _FURTHEST = 300.0  # a logarithm: starts farther from a prior are all as bad
 _MOST = 1e100  # m^2: more is as good as diverged
 _LONG = 100_000  # samples: slopes of more are kept in single precision
+_HELD = 4 * 10**7  # values of simulations that are held at a time, where fewer would do: 320 MB
 _MORE = 5  # steps as large as its last one by which a start may be behind the best
 
 
@@ -253,11 +254,12 @@ def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array,
     """Simulate steps tried (s, d, p): (s, d, N).
 
     With their finite differences (s, d, p, N), of which the next step needs one in d, where the
-    kernels take no longer for all of them; else None.
+    kernels take no longer for all of them and memory holds them; else None.
     """
     s, d, p = tries.shape
     flat = tries.reshape(-1, p)
-    if len(flat) * (p + 1) > LANES:
+    count = len(flat) * (p + 1)
+    if count > LANES or count * data.target.size > _HELD:
         return data.simulate(model, space.theta(flat)).reshape(s, d, -1), None
     out, slopes = with_jacobian(data, model, space, flat)
     return out.reshape(s, d, -1), slopes.reshape(s, d, p, -1)
