@@ -263,8 +263,11 @@ def test_samples_need_a_rate_that_can_be(posterior: ag.Calibration, rate: Any) -
 
 
 @pytest.mark.parametrize('path', [None, 7, b'a.npz', ['a.npz']])
-def test_files_need_a_name(posterior: ag.Calibration, path: Any) -> None:
-    """What is no path is refused as such, and says what to give."""
+def test_files_need_a_name(
+    posterior: ag.Calibration, path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is no path is refused as such, before a page is made, and says what to give."""
+    monkeypatch.setattr(ag.Calibration, 'page', lambda *_: pytest.fail('a page is made'))
     loads = ag.Calibration.load, ag.effects.load_effects
     for use in (posterior.save, posterior.save_mat, posterior.report, *loads):
         with pytest.raises(

@@ -145,9 +145,10 @@ class Combinations(Result, CombinationsData):
             InputError: the file cannot be written.
         """
         from actuator_glue.report import html
+        from actuator_glue.report.page_name import page_path
 
         with speaking(self.motion):
-            return html.write(path, self.page(next_command))
+            return html.write(page_path(path), self.page(next_command))
 
 
 @takes(CalibrationOptions)

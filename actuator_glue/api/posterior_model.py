@@ -179,9 +179,10 @@ class PosteriorModel(Result):
             InputError: the file cannot be written, or a partition that cannot be used.
         """
         from actuator_glue.report import html
+        from actuator_glue.report.page_name import page_path
 
         with speaking(self.motion):
-            return html.write(path, self.page(partition, next_command))
+            return html.write(page_path(path), self.page(partition, next_command))
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""

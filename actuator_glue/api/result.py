@@ -73,9 +73,10 @@ class Result(Shown):
             InputError: the file cannot be written.
         """
         from actuator_glue.report import html
+        from actuator_glue.report.page_name import page_path
 
         with speaking(self.motion):
-            return html.write(path, self.page())
+            return html.write(page_path(path), self.page())
 
     def __repr__(self) -> str:
         """Return what came out in a few lines, in the unit of its motion."""

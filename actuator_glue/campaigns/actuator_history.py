@@ -42,8 +42,10 @@ class ActuatorHistory(Shown, HistoryData):
         """
         from actuator_glue.campaigns.history_page import page  # draws: slow to import
         from actuator_glue.report import html
+        from actuator_glue.report.page_name import page_path
 
-        return html.write(path, page(self, path_given(path).resolve().parent))
+        path = page_path(path)
+        return html.write(path, page(self, path.resolve().parent))
 
     def brief(self) -> list[html.Block]:
         """Return the history in a sentence, changes, effects, the next test."""

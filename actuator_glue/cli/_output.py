@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from actuator_glue.arguments import Output, add_force, make_room
 from actuator_glue.errors import InputError, printable
 from actuator_glue.motion import spoken
-from actuator_glue.report.page_name import check_page_name
+from actuator_glue.report.page_name import page_path
 
 if TYPE_CHECKING:
     from actuator_glue.report.html import Block
@@ -41,7 +41,7 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 
 def _page(text: str) -> Output:
     try:
-        check_page_name(text)
+        page_path(text)
     except InputError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     return Output(text)

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from actuator_glue import __version__
 from actuator_glue.errors import InputError
-from actuator_glue.given import path as given_path
 from actuator_glue.motion import spoken
-from actuator_glue.report.page_name import check_page_name
+from actuator_glue.report.page_name import page_path
 from actuator_glue.report.style import data_uri, narrowed
 
 TEMPLATES = Path(__file__).with_name('templates')
@@ -136,8 +135,7 @@ def write(path: Path | str, page: Page) -> Path:
     Raises:
         InputError: no path, its name says another format, or the file cannot be written.
     """
-    path = given_path(path)
-    check_page_name(path)
+    path = page_path(path)
     text = render(page)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -5,20 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import path as given_path
 
 # What people ask for where a report is to be printed or sent.
 _OTHERS = {'.pdf', '.doc', '.docx', '.odt', '.md', '.png', '.svg', '.jpg', '.jpeg'}
 
 
-def check_page_name(path: Path | str) -> None:
-    """Refuse a name that says another format.
+def page_path(path: Path | str) -> Path:
+    """Return the path of a report; asked before the page is made, which takes seconds.
 
     Raises:
-        InputError: the suffix is that of another kind of document, or of a picture.
+        InputError: no path, or its suffix is that of another kind of document, or of a picture.
     """
-    suffix = Path(path).suffix
+    path = given_path(path)
+    suffix = path.suffix
     if suffix.lower() in _OTHERS:
         raise InputError(
             f'{path}: a report is one HTML file, no {suffix}; give a name that ends in .html (a '
             'browser prints it, also as PDF)'
         )
+    return path

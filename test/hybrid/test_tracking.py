@@ -9,6 +9,7 @@ import pytest
 
 import actuator_glue as ag
 from actuator_glue.api.diagnosis import _fitted, _tracking
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frequency_response import frequency_response
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
 from actuator_glue.api.tracking import record_tracking, records_tracking
@@ -20,6 +21,11 @@ from actuator_glue.model.structure import Structure
 
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
 THETA = np.array([133.65, 1.1005e9, 2.4927e5, 0.006])
+
+
+def drawn(structure: Structure, draws: np.ndarray) -> Drawn:
+    """Return draws (m, p) of a structure, without records."""
+    return Drawn(draws, structure.names, (), draws[0], structure, None, (), (), ())
 
 
 def test_a_pure_delay_is_told_as_one() -> None:
@@ -169,7 +175,7 @@ def test_a_lag_beyond_half_a_turn_is_no_lead(
     recorded = made.system._replace(C=np.broadcast_to(made.shown, made.system.C.shape))
     expected = np.median(true(recorded), axis=0)
     for i, f in enumerate(asked):
-        one = frequency_response(draws, structure.names, structure, stiffness, [f])
+        one = frequency_response(drawn(structure, draws), stiffness, [f])
         assert one.delay.median[0] == pytest.approx(expected[i], abs=1e-9)
         assert one.phase.median[0] == pytest.approx(-360.0 * f * expected[i], abs=1e-6)
 
@@ -185,7 +191,6 @@ def test_what_a_late_actuator_means_for_a_test_at_10_hz() -> None:
         rate=1000.0,
     )
     structure, draws = Structure(['delay']), np.tile([*TABLE_2, 0.0225], (4, 1))
-    told = hybrid_meaning(
-        partition, lambda k, f: frequency_response(draws, structure.names, structure, k, [f]).delay
-    )
+    late = drawn(structure, draws)
+    told = hybrid_meaning(partition, lambda k, f: frequency_response(late, k, [f]).delay)
     assert 'at 10 Hz the actuator lags by 51.17 ms (51.17 to 51.17)' in told
