@@ -52,7 +52,7 @@ def effective_size(
     power = sum(float(((e - mean) ** 2).sum()) for e in errors) / count
     if not (np.isfinite(power) and power > 0.0):
         raise InputError('the residual has no spread: its autocorrelation says nothing; give G')
-    basis = _basis(slopes[0] if len(slopes) == 1 else np.concatenate([*slopes], axis=1))
+    basis = _basis(np.concatenate([*slopes], axis=1))
     if not len(basis):
         return float(count)
     loud, again, begin = 0.0, 0.0, 0
@@ -77,7 +77,7 @@ def effective_size(
 def _basis(slopes: Array) -> Array:
     """Return orthonormal rows that span slopes (p, n) less their means, without what is tied."""
     rows = slopes - slopes.mean(axis=1, keepdims=True)
-    size = np.sqrt([(row**2).sum() for row in rows])
+    size = np.sqrt((rows**2).sum(axis=1))
     rows, size = (rows, size) if (size > 0.0).all() else (rows[size > 0.0], size[size > 0.0])
     rows /= size[:, None]
     if not len(rows):
