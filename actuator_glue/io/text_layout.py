@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats.delimited import (
     DELIMITERS,
+    NUMBER,
     fields_of,
     is_number,
     is_remark,
@@ -36,8 +37,7 @@ class _Rows(NamedTuple):
 
     def plain(self) -> re.Pattern[str]:
         """Return what a line matches whose entries are all numbers, which most lines are."""
-        sign = r'\.' if self.delimiter == ',' else '[.,]'
-        number = rf'[+-]?(?:\d+{sign}?\d*|{sign}\d+)(?:[ed][+-]?\d+)?'
+        number = NUMBER.format(sign=r'\.' if self.delimiter == ',' else '[.,]')
         parted = '[ \t]+' if self.delimiter is None else f' *{re.escape(self.delimiter)} *'
         row = parted.join([number] * (self.numbers[-1] + 1))
         return re.compile(f' *{row}[ \r\n]*', re.ASCII | re.IGNORECASE)

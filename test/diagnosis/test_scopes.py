@@ -99,7 +99,7 @@ def answer(found: Row, left: float) -> Any:
         found=SimpleNamespace(material=MATERIAL),
         decision=SimpleNamespace(left=1e-6 * left),
     )
-    for name in ('complete', 'matters'):
+    for name in ('leaves_nothing', 'matters'):
         setattr(out, name, vars(Conclusion)[name].fget(out))
     return out
 

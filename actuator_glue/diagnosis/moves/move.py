@@ -39,7 +39,8 @@ class AnswerMove:
         make: returns another answer, told where it has more weight; None, or the same with more
             rows, where there is none.
         each_time: whether it is tried again on the same answer when a machine has more data.
-        refits: whether it refits anything; else it is tried where the effort is spent, too.
+        refits: whether it refits further structures; else it is tried where the effort is spent,
+            too.
     """
 
     what: str
@@ -137,8 +138,7 @@ def described(result: Conclusion) -> bool:
 
 def left(result: Conclusion) -> bool:
     """Whether something material is left, and no record has a setting of its own."""
-    material = result.decision.left >= result.found.material
-    return (unexplained(result) or material) and result.found.final.own is None
+    return (unexplained(result) or not result.leaves_nothing) and without_own(result)
 
 
 def without_own(result: Conclusion) -> bool:

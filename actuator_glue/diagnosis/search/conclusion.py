@@ -97,12 +97,12 @@ class Conclusion:
         count in units of what remains.
         """
         both = self, other
-        complete = any(answer.complete for answer in both)
+        complete = any(answer.leaves_nothing for answer in both)
         units = [a.found.material if self.scope == other.scope else a.matters for a in both]
         return table.outweighs(self.row, other.row, min(units), complete)
 
     @property
-    def complete(self) -> bool:
+    def leaves_nothing(self) -> bool:
         """Whether nothing that matters is left."""
         return self.decision.left < self.found.material
 

@@ -127,8 +127,7 @@ class Judge:
             for t in trials
         ]
         nearest = min(trials, key=lambda t: t.fit.rms)
-        complete = self.left(nearest) < self.material
-        return trials[int(np.argmax(table.weights(rows, self.material, complete)))]
+        return trials[self._heaviest(rows, nearest)]
 
     def heaviest_known(self, told: Trial) -> Trial:
         """Return the structure of the greatest weight of all that were refitted.
@@ -137,10 +136,18 @@ class Judge:
             told: the reported one, returned where no other has more weight.
         """
         rows = table.rows(self.refits, self.refits.scorer)
-        ends = told, self.nearest_known()
-        complete = any(self.left(trial) < self.material for trial in ends)
-        best = rows[int(np.argmax(table.weights(rows, self.material, complete)))].effects
+        best = rows[self._heaviest(rows, told, self.nearest_known())].effects
         return told if set(best) == set(told.effects) else self.refits.trial(best)
+
+    def _heaviest(self, rows: Sequence[table.Row], *near: Trial) -> int:
+        """Return the place of the row of the greatest weight.
+
+        Args:
+            rows: structures.
+            near: those that may leave nothing that matters, likelier ones first.
+        """
+        complete = any(self.left(trial) < self.material for trial in near)
+        return int(np.argmax(table.weights(rows, self.material, complete)))
 
     def nearest_known(self) -> Trial:
         """Return the structure of the least error of all that were refitted."""

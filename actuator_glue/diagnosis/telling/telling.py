@@ -97,7 +97,7 @@ def told(
         prior=prior,
         setup=both.setup,
         structures=table.weighed(
-            result.rows(), found.material, final.effects, result.scope, result.complete
+            result.rows(), found.material, final.effects, result.scope, result.leaves_nothing
         ),
         names=tuple(p.name for p in after.model.parameters),
         posterior=both.draws,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import islice
@@ -31,9 +32,9 @@ _BROKEN = 10  # lines over which the names may go on: spreadsheets break lines w
 # ones.
 DELIMITERS = (';', '\t', ',', '|')
 _NOTHING = ' \r\n\x1a'  # all that a line without entries may hold; DOS ends a file with the last
-_NUMBER = re.compile(
-    r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?|nan|inf(?:inity)?)', re.ASCII | re.IGNORECASE
-)
+# A number as texts have it, with any decimal sign; its case is ignored.
+NUMBER = r'[+-]?(?:(?:\d+{sign}?\d*|{sign}\d+)(?:[ed][+-]?\d+)?|nan|inf(?:inity)?)'
+_NUMBER = re.compile(NUMBER.format(sign=r'\.'), re.ASCII | re.IGNORECASE)
 _FORTRAN = re.compile(r'(?<=[\d.])[dD](?=[+-]?\d)')  # the exponent of a double: 1.5D-3
 # Digits in groups of three, as thousands are written; a decimal fraction may look like it.
 _GROUPED = re.compile(r'[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+', re.ASCII)
@@ -431,16 +432,13 @@ def seconds_of(entries: list[str]) -> Array:
 
     They are read at once where all are written alike, as ISO 8601 without a zone.
     """
-    alike = len(set(map(len, entries))) == 1 and all(map(_ISO.fullmatch, entries))
-    day = '' if '-' in entries[0] else '1970-01-01T'
-    try:
-        times = np.array([day + entry for entry in entries if alike], dtype='datetime64[ns]')
-    except ValueError:  # 25:00:00
-        alike = False
-    if not alike:
-        return np.array(list(map(_seconds, entries)))
-    whole = times.astype('datetime64[s]')
-    return np.asarray(whole.astype(np.float64) + (times - whole).astype(np.float64) / 1e9)
+    if len(set(map(len, entries))) == 1 and all(map(_ISO.fullmatch, entries)):
+        day = '' if '-' in entries[0] else '1970-01-01T'
+        with suppress(ValueError):  # 25:00:00
+            times = np.array([day + entry for entry in entries], dtype='datetime64[ns]')
+            whole = times.astype('datetime64[s]')
+            return np.asarray(whole.astype(np.float64) + (times - whole).astype(np.float64) / 1e9)
+    return np.array(list(map(_seconds, entries)))
 
 
 def fields_of(line: str, delimiter: str | None) -> list[str]:
