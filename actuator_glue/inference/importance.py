@@ -2,9 +2,9 @@
 
 Batches come from mixtures of Student t's, each fitted to the weighted batches before it (Cappe et
 al. 2008); a weight compares the posterior with the mixture of all (adaptive multiple importance
-sampling, Cornuet et al. 2012). The largest weights are smoothed by a Pareto
-distribution (Vehtari et al. 2024), whose shape k tells whether they have a mean and a variance:
-from 0.5 on they have not, and nothing is returned.
+sampling, Cornuet et al. 2012). The largest weights are smoothed by a Pareto distribution, whose
+shape k tells whether means of them are reliable: from 0.7 on, or less for few draws, they are not
+(Vehtari et al. 2024, section 3.2.4), and nothing is returned.
 """
 
 from __future__ import annotations
@@ -21,15 +21,18 @@ from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
-_MOST = 10  # batches
-# From so many batches on, a run with less than this share of the draws due is left to chains.
-_LOOK, _SHARE = 3, 0.5
-_PARETO = 0.5
+_MOST = 20  # batches
+# From so many batches on, a run is left to chains where it has less than this share of the draws
+# due: they grow with the square of the batches, as the mixture comes nearer.
+_LOOK, _SHARE = 5, 0.25
+_PARETO = 0.7  # shape of the weights' tail
 _LEAST = 1e-9  # spread of coordinates that have none
 _EQUAL = 0.4  # of all draws are shared equally by a proposal's parts, whatever their weights
 _WIDEST = 700.0  # logarithm of a ratio of weights
 _NOTHING = 1e-300  # above the cut of a tail: its inverse, a few times over, is still a number
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
+_SHARING = 2  # times as many effective points as a normal distribution has dimensions fit one
+_BISECTIONS = 12
 
 
 class ImportanceSample(NamedTuple):
@@ -104,8 +107,10 @@ def sample(
     start: StudentMixture,
     effective: float,
     progress: Callable[[float], None] = lambda share: None,
-) -> ImportanceSample | None:
+) -> tuple[ImportanceSample | None, StudentMixture]:
     """Draw from a density near to a mixture of normal ones; None where it is too far from that.
+
+    Also returns the last mixture, which is nearer to the density than the first.
 
     Args:
         rng: random numbers.
@@ -122,17 +127,49 @@ def sample(
         points = np.concatenate([points, new])
         values = np.concatenate([values, log_density(new)])
         densities = np.concatenate([p.log_densities(points) for p in proposals])
-        weights, pareto_k = smoothed(values - np.logaddexp.reduce(densities, axis=0))
+        log_weights = values - np.logaddexp.reduce(densities, axis=0)
+        weights, pareto_k = smoothed(log_weights)
         count = 1.0 / float(weights @ weights)
         progress(min(1.0, count / effective))
-        if count >= effective and pareto_k < _PARETO:
+        if count >= effective and pareto_k < min(_PARETO, 1.0 - 1.0 / math.log10(len(points))):
             with np.errstate(divide='ignore'):
                 chosen = resample(rng, np.log(weights / weights.max()), len(points))
-            return ImportanceSample(points[rng.permutation(chosen)], count, pareto_k)
-        if number >= _LOOK and count < _SHARE * effective * number / _MOST:
+            drawn = ImportanceSample(points[rng.permutation(chosen)], count, pareto_k)
+            return drawn, proposals[-1]
+        shared = _flattened(log_weights, weights, dimension)
+        proposals.append(proposals[-1].refitted(points, shared))
+        if number >= _LOOK and count < _SHARE * effective * (number / _MOST) ** 2:
             break
-        proposals.append(proposals[-1].refitted(points, weights))
-    return None
+    return None, proposals[-1]
+
+
+def _flattened(log_weights: Array, weights: Array, dimension: int) -> Array:
+    """Return weights (m,) of sum 1 that enough points share to fit a normal distribution to.
+
+    Far from the density one point has all the weight: a power of the weights, as in annealing,
+    shows the way.
+
+    Args:
+        log_weights: (m,), not finite where impossible.
+        weights: the same, smoothed.
+        dimension: of the points.
+    """
+    fewest = _SHARING * (dimension + 1)
+    possible = np.isfinite(log_weights)
+    if 1.0 / float(weights @ weights) >= fewest or possible.sum() < 2 * fewest:
+        return weights
+    logs = np.where(possible, log_weights, -np.inf) - log_weights[possible].max()
+
+    def flat(power: float) -> Array:
+        found = np.exp(power * logs)
+        return np.asarray(found / found.sum())
+
+    low, high = 0.0, 1.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        shared = flat(middle)
+        low, high = (middle, high) if 1.0 / (shared @ shared) >= fewest else (low, middle)
+    return flat(low) if low > 0.0 else weights
 
 
 def smoothed(log_weights: Array) -> tuple[Array, float]:

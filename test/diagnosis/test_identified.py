@@ -37,13 +37,13 @@ def test_what_moves_with_an_open_parameter_is_open(spread: float) -> None:
 
 
 def test_draws_go_as_far_as_a_parameter_is_open() -> None:
-    """Along a ridge to its ends, over the bounds where chains differ; told are their quantiles."""
+    """Along a ridge to its ends, over the bounds where nothing is known."""
     rng = np.random.default_rng(4)
     space = Space(Structure(()), 40.0)
     centre = np.array([134.0, 1e9, 1e5, 0.5])
     draws = centre * np.exp(0.01 * rng.standard_normal((4000, 4)))
     ridge = centre * np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1e3, 1e4, 1.0]])
-    out, known = opened(space, draws, ridge, (False, False, False, True), rng)
+    out, known = opened(space, draws, ridge, (1.0, 1.0, 1.0, np.inf), rng)
     assert known.tolist() == [True, False, False, False]
     np.testing.assert_array_equal(out[:, 0], draws[:, 0])
     low, high = np.log(np.quantile(out, [0.025, 0.975], axis=0))
@@ -55,6 +55,22 @@ def test_draws_go_as_far_as_a_parameter_is_open() -> None:
     same, known = opened(space, draws, draws[:1], (), rng)
     np.testing.assert_array_equal(same, draws)
     assert known.all()
+
+
+def test_draws_of_chains_that_are_apart_spread_by_r_hat() -> None:
+    """About their median, to the bounds at most; what is then wider than knowledge is open."""
+    rng = np.random.default_rng(4)
+    space = Space(Structure(()), 40.0)
+    centre = np.array([134.0, 1e9, 1e5, 0.5])
+    draws = centre * np.exp(0.1 * rng.standard_normal((4000, 4)))
+    out, known = opened(space, draws, draws[:1], (1.0, 1.5, 1000.0, 1.0), rng)
+    assert known.tolist() == [True, True, False, True]
+    np.testing.assert_array_equal(out[:, [0, 3]], draws[:, [0, 3]])
+    assert np.median(out, axis=0) == pytest.approx(np.median(draws, axis=0), rel=1e-4)
+    assert np.log(out[:, 1]).std() == pytest.approx(1.5 * np.log(draws[:, 1]).std(), rel=1e-6)
+    lower, upper = space.theta(space.lower), space.theta(space.upper)
+    assert out[:, 2].min() == pytest.approx(lower[2])
+    assert out[:, 2].max() == pytest.approx(upper[2])
 
 
 STIFF_OIL = np.array([219.9, 6.23e10, 4.98e6, 4.74])

@@ -25,7 +25,7 @@ def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
     """Too few evaluations are no fault of the records: there is an answer all the same."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
     monkeypatch.setattr(posterior, '_FEWEST', 500)
-    monkeypatch.setattr(importance, 'sample', lambda *args: None)
+    monkeypatch.setattr(importance, 'sample', lambda *args: (None, args[2]))
     found = diagnose(make(['valve-deadband'], [2e-4], 31)[1:2], seed=2)
     assert [e.name for e in found.effects] == ['valve-deadband']
     assert found.sampler['method'] == 'laplace'
@@ -49,8 +49,8 @@ def test_a_companion_whose_chains_do_not_meet_opens_nothing(
 
     def apart(model: Structure, *args: Any, **options: Any) -> posterior.Draws:
         draws = drawn(model, *args, **options)
-        unmet = (True,) * len(model.parameters)
-        return draws._replace(unmet=unmet) if 'delay' in model.effects else draws
+        apart = (1.5,) * len(model.parameters)
+        return draws._replace(spread=apart) if 'delay' in model.effects else draws
 
     monkeypatch.setattr(posterior, 'sample', apart)
     found = diagnose(records, seed=2, settings=Thresholds(evaluations=0))
@@ -67,7 +67,7 @@ def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> Non
     for module in (posterior, advice):
         monkeypatch.setattr(module, 'RHAT', 0.9)
         monkeypatch.setattr(module, 'APART', 0.9)
-    monkeypatch.setattr(importance, 'sample', lambda *args: None)
+    monkeypatch.setattr(importance, 'sample', lambda *args: (None, args[2]))
 
     def larger(beam: BeamSearch, final: Trial, least: float | None = None) -> Trial:
         return final if least else beam.refits.additions(final, ['delay'])[0]

@@ -59,7 +59,7 @@ def test_chains_that_cannot_begin_lose_no_answer(monkeypatch: pytest.MonkeyPatch
     def refused(*_: object, **__: object) -> None:
         raise InputError('the log density is not finite at any of 35 points to start from')
 
-    monkeypatch.setattr(posterior.importance, 'sample', lambda *_: None)
+    monkeypatch.setattr(posterior.importance, 'sample', lambda *args: (None, args[2]))
     monkeypatch.setattr(posterior.posterior, 'sample', refused)
     found = diagnose(make(['delay'], [0.004], 31, 12.0), seed=2)
     assert found.sampler['method'] == 'laplace'

@@ -69,7 +69,8 @@ def test_draws_are_of_the_density_and_worth_what_they_say(
 
     The ratio is 0.95 to 1.25 over 300 runs; of 180 numbers it scatters by 0.11.
     """
-    runs = [importance.sample(np.random.default_rng(i), density, START, WANTED) for i in range(60)]
+    seeds = map(np.random.default_rng, range(60))
+    runs = [importance.sample(rng, density, START, WANTED)[0] for rng in seeds]
     found = [run for run in runs if run is not None]
     assert len(found) > 50
     assert min(run.effective for run in found) >= WANTED
@@ -95,7 +96,7 @@ def test_a_spike_and_a_slab_are_drawn_from_a_mixture() -> None:
 
     mixture = importance.StudentMixture(np.array([0.9, 0.1]), np.full((2, 3), 0.3), roots)
     for seed in range(5):
-        found = importance.sample(np.random.default_rng(seed), density, mixture, WANTED)
+        found, _ = importance.sample(np.random.default_rng(seed), density, mixture, WANTED)
         assert found is not None
         near = np.linalg.norm(found.points - 0.3, axis=1) < 0.1
         assert near.mean() == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(WANTED))
@@ -115,4 +116,18 @@ def test_none_of_what_it_cannot_reach() -> None:
 
     for density in (hills, tails, nothing):
         for seed in range(3):
-            assert importance.sample(np.random.default_rng(seed), density, START, WANTED) is None
+            rng = np.random.default_rng(seed)
+            assert importance.sample(rng, density, START, WANTED)[0] is None
+
+
+def test_what_it_came_to_is_nearer_than_what_it_began_with() -> None:
+    """Where it gives no draws, chains start there: a hill far off, of a tenth of the width."""
+
+    def far(z: np.ndarray) -> np.ndarray:
+        return -0.5 * (((z - 4.0) / 0.1) ** 2).sum(axis=1)
+
+    for seed in range(5):
+        found, reached = importance.sample(np.random.default_rng(seed), far, START, WANTED)
+        assert found is None
+        begun = np.linalg.norm(START.centres - 4.0)
+        assert np.linalg.norm(reached.centres[0] - 4.0) < 0.5 * begun

@@ -7,6 +7,7 @@ reported, saved, plotted and exported are these draws.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -96,7 +97,7 @@ class AnswerPosterior:
             )
             draws = model_form.widened(draws, form, self.space, self.rng)
         return posterior.opened(
-            self.space, draws, self.ridge, self.with_companions.unmet, self.rng
+            self.space, draws, self.ridge, self.with_companions.spread, self.rng
         )
 
     def estimates_before(self) -> dict[str, Estimate]:
@@ -171,14 +172,14 @@ def sampled(
     if named and decision.verdict in COMPLETE and not result.effort.over:
         out = replace(out, larger=companions.with_companions(result.beam, final))
     # If chains converged in no parameter, there is no interval for companions or rivals to widen.
-    if draws.unmet and all(draws.unmet):
+    if draws.spread and min(draws.spread) > 1.0:
         return out
     mixture = out.mixture
     if out.larger is not final:
         known = posterior.identified(out.space, draws.points, out.ridge).tolist()
         wider = sample(out.larger, evaluations)
-        unmet = reduced(wider, out.larger, final, known).unmet
-        if any(k and u for k, u in zip(known, unmet, strict=True)):
+        spread = reduced(wider, out.larger, final, known).spread
+        if any(k and s > 1.0 for k, s in zip(known, spread, strict=True)):
             # Chains that lose what the records fix say nothing of what is too small to matter.
             out = replace(out, larger=final)
         else:
@@ -221,6 +222,6 @@ def reduced(draws: Draws, larger: Trial, final: Trial, known: Sequence[bool]) ->
     """
     theirs = [p.name for p in larger.model.parameters]
     columns = [theirs.index(p.name) for p in final.model.parameters]
-    met = [not draws.unmet[i] for i in columns] if draws.unmet else known
-    unmet = tuple(not (a and b) for a, b in zip(met, known, strict=True))
-    return draws._replace(points=draws.points[:, columns], unmet=unmet)
+    theirs_spread = [draws.spread[i] if draws.spread else 1.0 for i in columns]
+    spread = tuple(s if k else math.inf for s, k in zip(theirs_spread, known, strict=True))
+    return draws._replace(points=draws.points[:, columns], spread=spread)

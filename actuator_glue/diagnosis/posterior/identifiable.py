@@ -45,6 +45,7 @@ class Working:
 
     Attributes:
         widest: spreads (p,) beyond which nothing is known.
+        box: lower and upper bounds of single coordinates, (p,) each.
     """
 
     def __init__(self, space: Space) -> None:
@@ -52,6 +53,7 @@ class Working:
         self.widest = space.upper - space.lower
         margin = _ROUNDING * self.widest
         self.lower, self.upper = space.lower - margin, space.upper + margin
+        self.box = self.lower, self.upper
         self.widest[:_P] = 1.0
 
     def forward(self, theta: Array) -> Array:
@@ -75,6 +77,8 @@ class Straight:
 
     Attributes:
         widest: spreads (p,) beyond which nothing is known.
+        box: lower and upper bounds of single coordinates, (p,) each; infinite for Eq. (2)'s, of
+            which combinations are bounded.
         least: coordinate of alpha_3 at its lower bound, alpha_2 as fitted [1/s]; 0 without a
             specimen, where alpha_3 does not act.
     """
@@ -100,6 +104,11 @@ class Straight:
         self.least = float(low[3] * stiffness / (stiffness + space.theta(fit)[2]))
         if stiffness > 0.0:
             self.widest[3] = self._ridge.upper[3]
+        base = np.arange(len(fit)) < _P
+        self.box = (
+            np.where(base, -np.inf, self._ridge.lower),
+            np.where(base, np.inf, self._ridge.upper),
+        )
         # Only the parameters have bounds, not the coordinates.
         self.lower, self.upper = np.full(len(fit), -np.inf), np.full(len(fit), np.inf)
         self._ridge.lower, self._ridge.upper = self.lower, self.upper

@@ -17,7 +17,7 @@ import scipy
 from actuator_glue.diagnosis.posterior.discrepancy import Discrepancy, ScaleMixture
 from actuator_glue.diagnosis.posterior.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score.scorer import Scorer, standard_error
-from actuator_glue.inference.least_squares.data import Data, lanes
+from actuator_glue.inference.least_squares.data import LANES, Data, lanes
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.fit import fit as fit_to
@@ -26,10 +26,11 @@ from actuator_glue.inference.least_squares.space import Space, diverged
 from actuator_glue.records import Array
 
 _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
-_HALVINGS = 40  # bring any point inside the bounds of the prior
 # From the optimum of the whitened error to that of the likelihood: a step that gains less ends
 # the search.
-_NATS, _MOST_STEPS = 0.5, 10
+_NATS, _MOST_STEPS = 0.5, 20
+# Lengths of a step that are tried, all at the same time.
+_LENGTHS = 0.5 ** np.arange(LANES)
 _SURE = 2.0  # standard errors over the blocks
 
 
@@ -135,10 +136,13 @@ class Likelihood:
         pull = math.sqrt(self.noise) * data.prior.pull(self.space.z(theta))
         return np.hstack([found, pull])
 
-    def _height(self, phi: Array) -> float:
-        """Log density at coordinates (p,), the prior of the coordinates included."""
-        theta, log_prior = self.around.inverse(phi[None])
-        return float(self(theta)[0] + log_prior[0])
+    def _heights(self, phi: Array) -> Array:
+        """Log densities (m,) at coordinates (m, p), the prior of the coordinates included."""
+        theta, heights = self.around.inverse(phi)
+        inside = np.isfinite(heights)
+        if inside.any():
+            heights[inside] += self(theta[inside])
+        return heights
 
     def _moves(self, phi: Array) -> ScaleMixture:
         """Distribution of the parameters' distance from coordinates (p,), if all is linear."""
@@ -159,26 +163,32 @@ class Likelihood:
         Args:
             phi: coordinates to begin at, (p,).
         """
-        best, moves = self._height(phi), self._moves(phi)
-        centre, new = phi, _inside(self.around, phi, moves.moments()[0])
-        for step in range(1, _MOST_STEPS):
-            height = self._height(new)
+        lower, upper = self.around.box
+        widest = self.around.widest
+        centre, best, moves = phi, float(self._heights(phi[None])[0]), self._moves(phi)
+        for step in range(_MOST_STEPS):
+            least, most = np.maximum(-widest, lower - centre), np.minimum(widest, upper - centre)
+            tries = centre + _LENGTHS[:, None] * _limited(moves, least, most)
+            heights = self._heights(tries)
+            longest = int(np.argmax(heights >= heights.max() - _NATS))
             # The first move goes to a mean, which may gain next to nothing.
-            if not height > best + (_NATS if step > 1 else -_NATS):
+            if not heights[longest] > best + (_NATS if step else -_NATS):
                 break
-            centre, best, moves = new, height, self._moves(new)
-            new = _inside(self.around, centre, moves.moments()[0])
+            centre, best = tries[longest], float(heights[longest])
+            moves = self._moves(centre)
         return Optimum(centre, moves, best)
 
 
-def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
-    """Return coordinates (p,) moved as far as they stay inside the bounds."""
-    move = np.clip(move, -around.widest, around.widest)
-    for _ in range(_HALVINGS):
-        if np.isfinite(around.inverse((phi + move)[None])[1][0]):
-            return phi + move
-        move *= 0.5
-    return phi
+def _limited(moves: ScaleMixture, least: Array, most: Array) -> Array:
+    """Return the mean move (p,), given that coordinates end at the limits that it would pass."""
+    mean, covariance = moves.moments()
+    move, held = mean.copy(), np.zeros(len(mean), dtype=np.bool_)
+    while (beyond := ~held & ((move < least) | (move > most))).any():
+        held |= beyond
+        move[held] = np.clip(move, least, most)[held]
+        slopes = np.linalg.lstsq(covariance[np.ix_(held, held)], (move - mean)[held], rcond=None)
+        move[~held] = mean[~held] + covariance[np.ix_(~held, held)] @ slopes[0]
+    return move
 
 
 def as_likely(scorer: Scorer, model: Model, theta: Array, other: Array) -> bool:

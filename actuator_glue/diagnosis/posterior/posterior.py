@@ -44,6 +44,7 @@ _ESS, RHAT = 400.0, 1.05
 _MOVES_WITH = 0.9  # rank correlation
 _UNLIKELY = 10.0  # nats behind the first optimum: another one has next to no share
 _HALVINGS = 40  # bring any point inside the bounds of the prior
+_STARTS = 320  # points that chains start among
 # Samples that chains may simulate in all evaluations together, and evaluations that they may make
 # anyway. Ten minutes of 10 kHz take 4 ms each: where 2600 did not suffice, 12 000 did not either,
 # as a ridge was left. Of five shorter records whose chains had not converged after some 4000, one
@@ -61,7 +62,8 @@ class Draws(NamedTuple):
         effective: effective sample size, the least of all parameters.
         rhat: largest R-hat of chains, else not-a-number.
         pareto_k: shape of the tail of importance weights, else not-a-number.
-        unmet: per parameter, whether its chains are apart; empty without chains.
+        spread: per parameter, the factor by which draws are to be spread: 1, R-hat where chains
+            are apart, infinite where the parameter is open; empty without chains.
     """
 
     points: Array
@@ -70,7 +72,7 @@ class Draws(NamedTuple):
     effective: float = math.nan
     rhat: float = math.nan
     pareto_k: float = math.nan
-    unmet: tuple[bool, ...] = ()
+    spread: tuple[float, ...] = ()
 
     def to_json(self) -> Json:
         """Return how they were drawn, as JSON."""
@@ -104,35 +106,42 @@ def identified(space: Space, draws: Array, ridge: Array) -> NDArray[np.bool_]:
 
 
 def opened(
-    space: Space, draws: Array, ridge: Array, unmet: Sequence[bool], rng: np.random.Generator
+    space: Space, draws: Array, ridge: Array, spread: Sequence[float], rng: np.random.Generator
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Spread draws as far as the records leave each parameter open.
 
-    Evenly in the working coordinates: over the ridge where draws do not reach its ends, over the
-    bounds where chains are apart. Intervals are quantiles of what is returned.
+    Chains that are apart together spread as far as they began, and further by R-hat, the factor by
+    which their scale may still change (Gelman & Rubin 1992). Evenly in the working coordinates:
+    over the ridge where draws do not reach its ends, over the bounds where a parameter is open.
+    Intervals are quantiles of what is returned.
 
     Args:
         space: working coordinates.
         draws: of all parameters (m, p), physical units.
         ridge: parameters that fit as well (n, p).
-        unmet: per parameter, whether its chains are apart; empty for none.
+        spread: per parameter, as `Draws.spread`.
         rng: random numbers.
 
     Returns:
         The draws (m, p) and which parameters the records fix (p,).
     """
-    known = identified(space, draws, ridge)
     z, far = space.z(draws), space.z(ridge)
+    by = np.array(spread) if spread else np.ones(z.shape[1])
+    open_, apart = np.isinf(by), np.isfinite(by) & (by > 1.0)
+    middle = np.median(z[:, apart], axis=0)
+    z[:, apart] = np.clip(
+        middle + by[apart] * (z[:, apart] - middle), space.lower[apart], space.upper[apart]
+    )
+    out = draws.copy()
+    out[:, apart] = space.theta(z)[:, apart]
+    known = identified(space, out, ridge)
     low, high = np.quantile(z, [0.025, 0.975], axis=0)
     ends = np.minimum(low, far.min(axis=0)), np.maximum(high, far.max(axis=0))
-    open_along = ~known & ((ends[0] < low) | (ends[1] > high))
-    differ = np.array(unmet, dtype=np.bool_) if unmet else np.zeros(len(known), dtype=np.bool_)
-    ends = np.where(differ, space.lower, ends[0]), np.where(differ, space.upper, ends[1])
-    spread = open_along | differ
-    z[:, spread] = rng.uniform(ends[0][spread], ends[1][spread], (len(z), int(spread.sum())))
-    out = draws.copy()
-    out[:, spread] = space.theta(z)[:, spread]
-    return out, known & ~differ
+    evenly = open_ | (~known & ((ends[0] < low) | (ends[1] > high)))
+    ends = np.where(open_, space.lower, ends[0]), np.where(open_, space.upper, ends[1])
+    z[:, evenly] = rng.uniform(ends[0][evenly], ends[1][evenly], (len(z), int(evenly.sum())))
+    out[:, evenly] = space.theta(z)[:, evenly]
+    return out, known & ~open_
 
 
 def _loosened(
@@ -247,14 +256,16 @@ def sample(
     transform, start = proposals.proposed(around, optima)
     goal = posterior.Target(likelihood, bounds, transform)
     seed = [int(word) for word in rng.integers(0, 2**32, 3)]
-    found = importance.sample(
+    found, reached = importance.sample(
         np.random.default_rng((*seed, 1)), goal.density(), start, _ESS, progress
     )
     if found is not None:
         points = loosened(transform.inverse(found.points)[0])
         return Draws(points, 'importance', len(points), found.effective, pareto_k=found.pareto_k)
     affordable = min(evaluations, max(_FEWEST, _SIMULATED // scorer.data.simulated(model)))
-    near = _inside(transform, start.draw(rng, 320), transform.forward(fit.theta[None])[0])
+    # Chains begin where importance sampling came to, and as far apart as it began.
+    wide = np.concatenate([start.draw(rng, _STARTS // 2), reached.draw(rng, _STARTS // 2)])
+    near = _inside(transform, wide, transform.forward(around.inverse(first.centre[None])[0])[0])
     try:
         chains = posterior.sample(
             goal,
@@ -275,5 +286,5 @@ def sample(
         chains.evaluations,
         effective=float(chains.ess.min()),
         rhat=float(chains.rhat.max()),
-        unmet=tuple(bool(r > APART) for r in chains.rhat),
+        spread=tuple(float(r) if r > APART else 1.0 for r in chains.rhat),
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from actuator_glue.diagnosis.posterior.discrepancy import ScaleMixture
 from actuator_glue.diagnosis.posterior.identifiable import Straight, Working
@@ -22,6 +23,7 @@ from actuator_glue.records import Array
 _LEAKAGE = 3  # column of alpha_3, of which records under one stiffness may show none
 _GRID = 200
 _REACH = 6.0  # standard deviations
+_FAR = 1e2  # of them: what is left is exponential
 _LEAST = 1e-6  # of all draws
 _NOTHING = -1e300  # logarithm of the mass of an optimum that diverges
 
@@ -35,7 +37,7 @@ def proposed(
         around: coordinates in which the response is taken as linear about each optimum.
         optima: at least one.
     """
-    parts = _together(optima, around.widest)
+    parts = _together(optima, around)
     outer: Transform = around
     if isinstance(around, Straight) and around.least > 0.0:
         parts, bent = _near_zero(parts, around.least)
@@ -50,16 +52,46 @@ def proposed(
     return Composed(outer, normal), start
 
 
-def _together(optima: Sequence[Optimum], widest: Array) -> ScaleMixture:
+def _together(optima: Sequence[Optimum], around: Working | Straight) -> ScaleMixture:
     """Return the normal distributions about all optima, weighted by their posterior mass."""
     masses = np.maximum([o.log_mass() for o in optima], _NOTHING)
     shares = np.exp(masses - np.logaddexp.reduce(masses))
-    all_ = [_bounded(o.moves, widest) for o in optima]
-    return ScaleMixture(
+    all_ = [_bounded(o.moves, around.widest) for o in optima]
+    parts = ScaleMixture(
         np.concatenate([s * m.weights for s, m in zip(shares, all_, strict=True)]),
         np.concatenate([o.centre + m.means for o, m in zip(optima, all_, strict=True)]),
         np.concatenate([m.covariances for m in all_]),
     )
+    return _cut(parts, *around.box)
+
+
+def _cut(parts: ScaleMixture, lower: Array, upper: Array) -> ScaleMixture:
+    """Give parts the moments that they have between bounds (p,): most of one may lie beyond.
+
+    One coordinate after the other; those that go with it follow.
+    """
+    means, covariances = parts.means.copy(), parts.covariances.copy()
+    for mean, covariance in zip(means, covariances, strict=True):
+        for i, (low, high) in enumerate(zip(lower, upper, strict=True)):
+            sd = np.sqrt(covariance[i, i])
+            ends = float((low - mean[i]) / sd), float((mean[i] - high) / sd)
+            end, side = max((ends[0], 1.0), (ends[1], -1.0))
+            if end < -_REACH:
+                continue
+            distance, variance = _above(end)
+            slope = covariance[:, i] / sd
+            mean += slope * side * distance
+            covariance += np.outer(slope, slope) * (variance - 1.0)
+    return ScaleMixture(parts.weights, means, covariances)
+
+
+def _above(end: float) -> tuple[float, float]:
+    """Mean and variance of a standard normal variable that is above some end."""
+    if end > _FAR:
+        return end + 1.0 / end, 1.0 / end**2
+    density = -0.5 * (end**2 + np.log(2.0 * np.pi))
+    mean = float(np.exp(density - log_ndtr(-end)))
+    return mean, 1.0 - mean * (mean - end)
 
 
 def _bounded(moves: ScaleMixture, widest: Array) -> ScaleMixture:

@@ -183,9 +183,9 @@ def unconverged(rhat: float) -> tuple[str, ...]:
             f'{100.0 * (rhat - 1.0):.0f} % too narrow or too wide',
         )
     return (
-        f'the chains of the posterior have not met (R-hat {rhat:.2f}): sizes that they differ '
-        'about are told as not identified, and names of effects that may then be nothing have a '
-        'lower probability; errors do not depend on them',
+        f'the chains of the posterior have not met (R-hat {rhat:.2f}): intervals are widened by '
+        'as much, and names of effects that may then be nothing have a lower probability; errors '
+        'do not depend on them',
     )
 
 
