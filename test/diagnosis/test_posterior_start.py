@@ -41,7 +41,7 @@ def test_chains_keep_the_spread_of_the_posterior(
         assert found.rhat == pytest.approx(rhat.max(), rel=0.05)
         assert rhat.max() < 1.15 and ess.min() > 200
     else:
-        assert told['effective_draws'] >= 400 and told['pareto_k'] < 0.5 and np.isnan(found.rhat)
+        assert told['effective_draws'] >= 400 and told['pareto_k'] < 0.7 and np.isnan(found.rhat)
     # Over these cases and three seeds of DREAM(ZS): R-hat up to 1.06, ESS from 397, ratios from
     # 0.88 to 1.04 for the effect, 0.84 to 1.01 for beta_1 and 0.93 to 2.14 for what a ridge leaves
     # open.
