@@ -115,6 +115,7 @@ def test_tests_that_were_given_to_hold_out_are_predicted_too() -> None:
         assert np.sqrt(np.mean(off**2)) < 0.2 * found.error.noise_floor
 
 
+@pytest.mark.slow
 def test_a_prediction_covers_single_samples_where_means_were_fitted(tmp_path: Path) -> None:
     """At 1024 Hz means of three are fitted; 95 % of the samples of an unseen test are inside.
 

@@ -89,6 +89,7 @@ def test_an_effect_that_went_is_told(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_pooled_intervals_and_the_next_test_hold_the_truth(tmp_path: Path) -> None:
     """0.95 of 2400 intervals of days, and of 40 next tests by 4 parameters (seeds written down).
 

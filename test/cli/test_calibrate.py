@@ -64,6 +64,7 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
     assert saved['names'].tolist() == list(NAMES)
 
 
+@pytest.mark.slow
 def test_the_published_sampler_finds_the_same_posterior_and_says_where_it_has_not(
     run, problem_r: Path, rng_seed: int
 ) -> None:

@@ -62,6 +62,7 @@ def run(read_only: Callable[..., list[str]], lines: str, seconds: float) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_what_is_quick_runs(read_only: Callable[..., list[str]]) -> None:
     run(read_only, QUICK, 400)
 

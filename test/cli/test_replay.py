@@ -289,6 +289,7 @@ def test_samples_that_nobody_described_are_named(
     assert run('replay', bag, '--stiffness', 250e3, '--evaluations', 4000).code == 0
 
 
+@pytest.mark.slow
 def test_of_thousands_of_events_the_first_are_told(
     estimated: Callable[..., Path], tmp_path: Path
 ) -> None:

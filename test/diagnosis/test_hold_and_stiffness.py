@@ -86,6 +86,7 @@ def test_a_lead_of_about_half_a_sample_is_the_other_hold() -> None:
     assert other is not None and other.runs_linearly and other.enough
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('few_forms', 'few_names')
 def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> None:
     """Play under held commands, begun with linear ones."""
@@ -130,6 +131,7 @@ def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
     assert found.error.after > 1.5 * found.error.noise_floor
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('few_forms', 'few_names')
 def test_a_lead_is_held_against_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """A gain that drifts: a lead alone explains most of it, and noise hides the rest."""

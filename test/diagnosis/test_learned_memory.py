@@ -101,6 +101,7 @@ def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
         assert excited['t'] == (0.0, SECONDS - 1.0 / RATE)
 
 
+@pytest.mark.slow
 def test_lost_motion_has_one_size() -> None:
     """A share of the reading that has play is one, and must be worth its parameter.
 

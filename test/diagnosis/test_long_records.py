@@ -33,6 +33,7 @@ def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
     assert size.lower < 2e-4 < size.upper and size.identified
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('few_forms', 'few_names')
 def test_a_companion_whose_chains_do_not_meet_opens_nothing(
     monkeypatch: pytest.MonkeyPatch,

@@ -28,6 +28,7 @@ def commands_forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ..
     return tuple(effect for effect in forms(scale, known) if effect.place == 'command')
 
 
+@pytest.mark.slow
 def test_a_setting_is_tried_beside_a_learned_term(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command that grows with its rate, and an offset of the second record."""
     monkeypatch.setattr(refits, 'forms', commands_forms)

@@ -52,6 +52,7 @@ def test_chains_keep_the_spread_of_the_posterior(
     assert estimate.mean == pytest.approx(size, abs=5 * estimate.stddev)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('few_forms', 'few_names')
 def test_chains_that_cannot_begin_lose_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many parameters pressed against their bounds, around which no point is possible."""

@@ -41,6 +41,7 @@ def before() -> tuple[BeamSearch, Selection]:
     return dirty, dirty.run()
 
 
+@pytest.mark.slow
 def test_an_answer_is_kept_where_impulses_are_removed_and_no_effort_is_left(
     before: tuple[BeamSearch, Selection],
 ) -> None:

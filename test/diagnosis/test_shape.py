@@ -57,6 +57,7 @@ def test_friction_that_is_reached_late_has_its_shape(
     assert held_out(shaped, kind) < share * held_out(found, kind)
 
 
+@pytest.mark.slow
 def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     """Its shape is that of the catalogue.
 

@@ -43,6 +43,7 @@ def test_one_alone_is_no_pair() -> None:
     assert two_effects.explained(beam, found) is None
 
 
+@pytest.mark.slow
 def test_a_member_that_matters_alone_needs_more() -> None:
     """What does not complete an answer must remove all that matters."""
     beam, found = selected(DELAY, DROOP, ('delay', 'supply-droop'))

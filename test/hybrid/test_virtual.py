@@ -201,6 +201,7 @@ def test_the_benchmark_is_tracked(case: int, benchmark_draws: Made) -> None:
     assert abs(found.virtual.indicators['J1_s'].median) <= 0.25e-3
 
 
+@pytest.mark.slow
 def test_the_robust_compensator_is_better_in_its_worst_percentile(benchmark_draws: Made) -> None:
     """Two actuators, a fifth of the draws the slower one: the inverse of the mean misses it.
 

@@ -94,6 +94,7 @@ def test_a_run_that_ends_in_its_adaptation_gives_no_posterior() -> None:
     assert len(found.kept) >= 30
 
 
+@pytest.mark.slow
 def test_variance_of_means_is_what_the_effective_sample_size_says(rng_seed: int) -> None:
     """Over replicates, (mean - truth)^2 ESS / variance is chi-squared with as many degrees.
 

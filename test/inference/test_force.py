@@ -100,6 +100,7 @@ def deviations(data: Data, theta: Array) -> Array:
     return np.asarray(np.sqrt(np.diag(covariance)[[2, 4]]))
 
 
+@pytest.mark.slow
 def test_the_force_tells_damping_from_the_actuator(rng_seed: int) -> None:
     """Damping of the specimen is one of the base parameters' doings to the displacement alone.
 

@@ -147,6 +147,7 @@ def test_what_a_full_disk_refuses_is_written_when_there_is_room(tmp_path: Path) 
     on_small_disk(tmp_path, script)
 
 
+@pytest.mark.slow
 def test_a_bag_on_a_disk_that_stays_full_is_finished_and_says_what_it_lacks(
     tmp_path: Path,
 ) -> None:

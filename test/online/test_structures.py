@@ -311,6 +311,7 @@ def slow_beside():
     return Beside((2, 0, 3), fails=(4, 7))
 
 
+@pytest.mark.slow
 def test_no_window_of_the_likeliest_waits_for_the_others(slow_beside):
     """Its job holds nothing of them but what they forecast with."""
     first = slow_beside.results[0]

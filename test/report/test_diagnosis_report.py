@@ -156,6 +156,7 @@ def test_lines_break_where_samples_were_held_out() -> None:
         assert t.time[second][-1] - t.time[second][0] < 1.0
 
 
+@pytest.mark.slow
 def test_of_hundreds_of_records_the_worst_are_drawn() -> None:
     """A picture of all would be of more points than a file may have; all of a few are drawn."""
     few = diagnosis(6e-5)

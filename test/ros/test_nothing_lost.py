@@ -119,6 +119,7 @@ def sending(probe, condition):
     return looked_at
 
 
+@pytest.mark.slow
 def test_what_comes_while_a_disk_is_full_is_recorded_when_it_is_not(start, probe, tmp_path):
     """The largest file allowed shrinks while the recorder runs, as a quota does, and grows."""
     bag = tmp_path / 'bag'

@@ -75,6 +75,7 @@ def test_who_is_alone_has_nothing_to_end():
     assert told([1, 1, 2, 2, 3, 3, 4, 4], publishers=1) == ''
 
 
+@pytest.mark.slow
 def test_the_recorder_tells_of_two_simulators_and_of_no_restart(start, probe, tmp_path):
     """A node that was killed, one started in its place, one that is inactive: all is well."""
     recorder = start('recorder', bag=str(tmp_path / 'bag'))

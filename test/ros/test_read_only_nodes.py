@@ -38,6 +38,7 @@ def parameters(**values):
     return ['--ros-args', *(a for k, v in values.items() for a in ('-p', f'{k}:={v}'))]
 
 
+@pytest.mark.slow
 def test_all_that_listens_runs_on_a_read_only_disk(begin, probe, tmp_path):
     """In one process, whose start takes long; the bag goes where it may."""
     bag = tmp_path / 'out' / 'bag'

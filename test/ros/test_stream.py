@@ -87,6 +87,7 @@ def test_one_kilohertz_for_a_minute_misses_no_deadline(start, probe, tmp_path):
     assert 0.94 < np.mean(coverage) < 0.96
 
 
+@pytest.mark.slow
 def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path):
     bag, told = tmp_path / 'bag', list[PosteriorMoments]()
     probe.create_subscription(PosteriorMoments, 'posterior', told.append, topics.POSTERIOR.qos)

@@ -1,6 +1,7 @@
 """A stiffness that nobody knows: what the nodes say, and for how long."""
 
 import numpy as np
+import pytest
 from actuator_glue_msgs.action import Diagnose
 from rclpy.action import ActionClient
 from ros_nodes import QUICK, RATE
@@ -20,6 +21,7 @@ def motion(seconds):
     return Record(command, measured + noise, 1 / RATE, 250e3)
 
 
+@pytest.mark.slow
 def test_the_estimator_complains_as_long_as_it_holds_and_no_longer(start, probe):
     estimator = start('estimator', diagnostics_period=0.2, **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 250, 'estimator compiled')

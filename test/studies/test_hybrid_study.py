@@ -62,6 +62,7 @@ def test_limits_of_a_bin_are_binomial() -> None:
         assert least == binom.ppf(0.025, 40, p) and most == binom.ppf(0.975, 40, p)
 
 
+@pytest.mark.slow
 def test_right_predictions_are_refused_as_seldom_as_stated(rng_seed: int) -> None:
     """All bins together: 5 % at most, the counts being whole; wrong ones are found.
 

@@ -34,6 +34,7 @@ def test_added_residual_is_what_white_noise_does_on_average(rng_seed: int) -> No
     assert np.mean(variances) == pytest.approx(np.exp(-expected), rel=0.01)
 
 
+@pytest.mark.slow
 def test_spread_of_table_4_is_met_at_about_0_7_mm(rng_seed: int) -> None:
     # The COV of one run of 60 000 evaluations scatters by about 3 % here; 15 % is asked.
     errors = ExactErrors(reference_problem.records(1))

@@ -96,6 +96,7 @@ def test_until_the_process_is_ready_reports_are_computed_here(
     assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('beside', [pytest.param(True, marks=needs_two_cores), False])
 def test_without_limits_all_else_is_there(
     record: Record, alone: list[object], beside: bool
