@@ -21,10 +21,10 @@ from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
-_MOST = 20  # batches
-# From so many batches on, a run is left to chains where it has less than this share of the draws
-# due: they grow with the square of the batches, as the mixture comes nearer.
-_LOOK, _SHARE = 5, 0.25
+_MOST = 32  # batches
+# From so many batches on, a run is left to chains where it has fewer effective draws than this
+# times the square of the batches: they grow so as the mixture comes nearer.
+_LOOK, _PACE = 5, 0.25
 _PARETO = 0.7  # shape of the weights' tail
 _LEAST = 1e-9  # spread of coordinates that have none
 _EQUAL = 0.4  # of all draws are shared equally by a proposal's parts, whatever their weights
@@ -138,7 +138,7 @@ def sample(
             return drawn, proposals[-1]
         shared = _flattened(log_weights, weights, dimension)
         proposals.append(proposals[-1].refitted(points, shared))
-        if number >= _LOOK and count < _SHARE * effective * (number / _MOST) ** 2:
+        if number >= _LOOK and count < _PACE * number**2:
             break
     return None, proposals[-1]
 

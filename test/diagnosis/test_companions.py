@@ -61,7 +61,7 @@ def test_what_does_not_matter_is_held_beside() -> None:
     draws = answer_posterior.reduced(
         sampled(beam, found, larger), larger, found.final, [True] * 4 + [False]
     )
-    assert draws.spread == (1.0, 1.0, 1.0, 1.0, np.inf)  # what is open stays open
+    assert draws.widening == (1.0, 1.0, 1.0, 1.0, np.inf)  # what is open stays open
     assert draws.points.shape[1] == 5
     # Five standard deviations of the estimate: fails by chance once in 10^6.
     low, high = np.quantile(draws.points[:, 4], [0.025, 0.975])

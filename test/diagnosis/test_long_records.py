@@ -51,7 +51,7 @@ def test_a_companion_whose_chains_do_not_meet_opens_nothing(
     def apart(model: Structure, *args: Any, **options: Any) -> posterior.Draws:
         draws = drawn(model, *args, **options)
         apart = (1.5,) * len(model.parameters)
-        return draws._replace(spread=apart) if 'delay' in model.effects else draws
+        return draws._replace(widening=apart) if 'delay' in model.effects else draws
 
     monkeypatch.setattr(posterior, 'sample', apart)
     found = diagnose(records, seed=2, settings=Thresholds(evaluations=0))

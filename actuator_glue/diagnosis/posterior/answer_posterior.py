@@ -97,7 +97,7 @@ class AnswerPosterior:
             )
             draws = model_form.widened(draws, form, self.space, self.rng)
         return posterior.opened(
-            self.space, draws, self.ridge, self.with_companions.spread, self.rng
+            self.space, draws, self.ridge, self.with_companions.widening, self.rng
         )
 
     def estimates_before(self) -> dict[str, Estimate]:
@@ -171,15 +171,14 @@ def sampled(
     named = not any_learned(final.structure)
     if named and decision.verdict in COMPLETE and not result.effort.over:
         out = replace(out, larger=companions.with_companions(result.beam, final))
-    # If chains converged in no parameter, there is no interval for companions or rivals to widen.
-    if draws.spread and min(draws.spread) > 1.0:
-        return out
     mixture = out.mixture
-    if out.larger is not final:
+    # Chains that met in no parameter would meet with companions even less.
+    apart = bool(draws.widening) and min(draws.widening) > 1.0
+    if out.larger is not final and not apart:
         known = posterior.identified(out.space, draws.points, out.ridge).tolist()
         wider = sample(out.larger, evaluations)
-        spread = reduced(wider, out.larger, final, known).spread
-        if any(k and s > 1.0 for k, s in zip(known, spread, strict=True)):
+        widening = reduced(wider, out.larger, final, known).widening
+        if any(k and w > 1.0 for k, w in zip(known, widening, strict=True)):
             # Chains that lose what the records fix say nothing of what is too small to matter.
             out = replace(out, larger=final)
         else:
@@ -222,6 +221,6 @@ def reduced(draws: Draws, larger: Trial, final: Trial, known: Sequence[bool]) ->
     """
     theirs = [p.name for p in larger.model.parameters]
     columns = [theirs.index(p.name) for p in final.model.parameters]
-    theirs_spread = [draws.spread[i] if draws.spread else 1.0 for i in columns]
-    spread = tuple(s if k else math.inf for s, k in zip(theirs_spread, known, strict=True))
-    return draws._replace(points=draws.points[:, columns], spread=spread)
+    found = [draws.widening[i] if draws.widening else 1.0 for i in columns]
+    widening = tuple(w if k else math.inf for w, k in zip(found, known, strict=True))
+    return draws._replace(points=draws.points[:, columns], widening=widening)

@@ -62,7 +62,7 @@ class Draws(NamedTuple):
         effective: effective sample size, the least of all parameters.
         rhat: largest R-hat of chains, else not-a-number.
         pareto_k: shape of the tail of importance weights, else not-a-number.
-        spread: per parameter, the factor by which draws are to be spread: 1, R-hat where chains
+        widening: per parameter, the factor by which draws are to be spread: 1, R-hat where chains
             are apart, infinite where the parameter is open; empty without chains.
     """
 
@@ -72,7 +72,7 @@ class Draws(NamedTuple):
     effective: float = math.nan
     rhat: float = math.nan
     pareto_k: float = math.nan
-    spread: tuple[float, ...] = ()
+    widening: tuple[float, ...] = ()
 
     def to_json(self) -> Json:
         """Return how they were drawn, as JSON."""
@@ -106,7 +106,7 @@ def identified(space: Space, draws: Array, ridge: Array) -> NDArray[np.bool_]:
 
 
 def opened(
-    space: Space, draws: Array, ridge: Array, spread: Sequence[float], rng: np.random.Generator
+    space: Space, draws: Array, ridge: Array, widening: Sequence[float], rng: np.random.Generator
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Spread draws as far as the records leave each parameter open.
 
@@ -119,14 +119,14 @@ def opened(
         space: working coordinates.
         draws: of all parameters (m, p), physical units.
         ridge: parameters that fit as well (n, p).
-        spread: per parameter, as `Draws.spread`.
+        widening: per parameter, as `Draws.widening`.
         rng: random numbers.
 
     Returns:
         The draws (m, p) and which parameters the records fix (p,).
     """
     z, far = space.z(draws), space.z(ridge)
-    by = np.array(spread) if spread else np.ones(z.shape[1])
+    by = np.array(widening) if widening else np.ones(z.shape[1])
     open_, apart = np.isinf(by), np.isfinite(by) & (by > 1.0)
     middle = np.median(z[:, apart], axis=0)
     z[:, apart] = np.clip(
@@ -174,8 +174,8 @@ def _normal(laplace: Composed, count: int, rng: np.random.Generator) -> Array:
     return laplace.inverse(w)[0]
 
 
-def _inside(transform: Transform, points: Array, fit: Array) -> Array:
-    """Pull points (m, p) towards the fit (p,) until none is impossible.
+def _inside(transform: Transform, points: Array, towards: Array) -> Array:
+    """Pull points (m, p) towards a possible one (p,) until none is impossible.
 
     Near a bound, all draws of the linear approximation may lie beyond it.
     """
@@ -183,7 +183,7 @@ def _inside(transform: Transform, points: Array, fit: Array) -> Array:
         outside = ~np.isfinite(transform.inverse(points)[1])
         if not outside.any():
             return points
-        points[outside] = fit + 0.5 * (points[outside] - fit)
+        points[outside] = towards + 0.5 * (points[outside] - towards)
     return np.asarray(points[~outside])
 
 
@@ -286,5 +286,5 @@ def sample(
         chains.evaluations,
         effective=float(chains.ess.min()),
         rhat=float(chains.rhat.max()),
-        spread=tuple(float(r) if r > APART else 1.0 for r in chains.rhat),
+        widening=tuple(float(r) if r > APART else 1.0 for r in chains.rhat),
     )
