@@ -31,8 +31,8 @@ _EQUAL = 0.4  # of all draws are shared equally by a proposal's parts, whatever 
 _WIDEST = 700.0  # logarithm of a ratio of weights
 _NOTHING = 1e-300  # above the cut of a tail: its inverse, a few times over, is still a number
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
-_SHARING = 2  # times as many effective points as a normal distribution has dimensions fit one
-_BISECTIONS = 12
+_PER_DIMENSION = 2  # effective points, at least, that a normal distribution is fitted to
+_BISECTIONS = 12  # find the power of the weights that leaves so many
 
 
 class ImportanceSample(NamedTuple):
@@ -154,7 +154,7 @@ def _flattened(log_weights: Array, weights: Array, dimension: int) -> Array:
         weights: the same, smoothed.
         dimension: of the points.
     """
-    fewest = _SHARING * (dimension + 1)
+    fewest = _PER_DIMENSION * (dimension + 1)
     possible = np.isfinite(log_weights)
     if 1.0 / float(weights @ weights) >= fewest or possible.sum() < 2 * fewest:
         return weights

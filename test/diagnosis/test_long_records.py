@@ -63,7 +63,7 @@ def test_a_companion_whose_chains_do_not_meet_opens_nothing(
 
 @pytest.mark.slow
 def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where they have met nowhere nothing beside, or in place, is drawn: no interval shows it."""
+    """Where they have met nowhere no companion is drawn beside: it would meet even less."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
     for module in (posterior, advice):
         monkeypatch.setattr(module, 'RHAT', 0.9)

@@ -23,7 +23,7 @@ from actuator_glue.records import Array
 _LEAKAGE = 3  # column of alpha_3, of which records under one stiffness may show none
 _GRID = 200
 _REACH = 6.0  # standard deviations
-_FAR = 1e2  # of them: what is left is exponential
+_FAR = 1e2  # standard deviations beyond a bound: what is left is nearly exponential
 _LEAST = 1e-6  # of all draws
 _NOTHING = -1e300  # logarithm of the mass of an optimum that diverges
 
