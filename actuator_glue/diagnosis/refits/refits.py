@@ -345,7 +345,9 @@ class Refits:
         def add(refit: tuple[Trial, str, bool]) -> Trial:
             return self.add(*refit[:2], briefly=refit[2])
 
-        for i, _ in enumerate(self.each(add, first.values())):
+        # The longest first, so that at the end no thread works on one alone for long.
+        longest = sorted(first.values(), key=lambda refit: -self._expected_work(*refit))
+        for i, _ in enumerate(self.each(add, longest)):
             if progress is not None:
                 progress((i + 1) / len(first))
             else:
@@ -383,6 +385,12 @@ class Refits:
         shares = list(self.each(lambda n: self.promises.share(current, n, least), names))
         far = {n for n, s in zip(names, shares, strict=True) if s < least and n != FEEDBACK}
         return [(current, n, n in far) for n in names if asked.every or n not in far]
+
+    def _expected_work(self, current: Trial, name: str, briefly: bool) -> int:
+        """Return the work of a refit's first step: of all its starts, with their slopes."""
+        model = self.structure(*current.effects, name)
+        starts = 1 if briefly else len(self.promises.screen(current, name)[1])
+        return starts * len(model.parameters) * self.data.sub_steps(model)
 
     def _structure(self, fit: Fit) -> float:
         """Return the share of a fit's squared error that is no noise."""

@@ -21,6 +21,7 @@ from actuator_glue.inference.least_squares.fit import fit, rms
 from actuator_glue.inference.least_squares.space import sum_of_squares
 
 _STARTS = 3  # draws that are nearest to the held-out part, beside the best fit
+_TOLERANCE = 1e-4  # of the squared error: far below what matters of it
 
 
 def reached_by_both(
@@ -59,7 +60,8 @@ def reached(scorer: Scorer, held: Data, side: Side) -> float | None:
     data, model, theta, draws = scorer.data, side.model, side.theta, side.draws
     some = draws[:: max(1, len(draws) // LANES)][:LANES]
     nearest = np.argsort(sum_of_squares(held.target - held.simulate(model, some)))[:_STARTS]
-    both = fit(_together(data, held), model, np.vstack([theta, some[nearest]])).theta
+    starts = np.vstack([theta, some[nearest]])
+    both = fit(_together(data, held), model, starts, tolerance=_TOLERANCE).theta
     if not as_likely(scorer, model, theta, both):
         return None
     return rms(held.target - held.simulate(model, both)[0])
