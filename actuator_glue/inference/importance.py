@@ -22,9 +22,9 @@ from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
 _MOST = 32  # batches
-# From so many batches on, a run is left to chains where it has fewer effective draws than this
-# times the square of the batches: they grow so as the mixture comes nearer.
-_LOOK, _PACE = 5, 0.25
+# Effective draws grow by leaps and with relapses as the mixture comes nearer: their growth is that
+# of the largest number in so many batches over the largest before.
+_LEAPS = 5
 _PARETO = 0.7  # shape of the weights' tail
 _LEAST = 1e-9  # spread of coordinates that have none
 _EQUAL = 0.4  # of all draws are shared equally by a proposal's parts, whatever their weights
@@ -122,7 +122,8 @@ def sample(
     dimension = start.centres.shape[1]
     points, values = np.empty((0, dimension)), np.empty(0)
     proposals = [start._replace(shares=_shared(start.shares))]
-    for number in range(1, _MOST + 1):
+    counts: list[float] = []
+    for _ in range(_MOST):
         new = proposals[-1].draw(rng, _BATCH)
         points = np.concatenate([points, new])
         values = np.concatenate([values, log_density(new)])
@@ -130,6 +131,7 @@ def sample(
         log_weights = values - np.logaddexp.reduce(densities, axis=0)
         weights, pareto_k = smoothed(log_weights)
         count = 1.0 / float(weights @ weights)
+        counts.append(count if math.isfinite(pareto_k) else 1.0)  # else hardly any is possible
         progress(min(1.0, count / effective))
         if count >= effective and pareto_k < min(_PARETO, 1.0 - 1.0 / math.log10(len(points))):
             with np.errstate(divide='ignore'):
@@ -138,9 +140,18 @@ def sample(
             return drawn, proposals[-1]
         shared = _flattened(log_weights, weights, dimension)
         proposals.append(proposals[-1].refitted(points, shared))
-        if number >= _LOOK and count < _PACE * number**2:
+        if _most_expected(counts) < effective:
             break
     return None, proposals[-1]
+
+
+def _most_expected(counts: list[float]) -> float:
+    """Return how many effective draws the last batch has, if they go on growing as they did."""
+    if len(counts) < 2 * _LEAPS:
+        return math.inf
+    last = max(counts[-_LEAPS:])
+    growth = last / max(counts[:-_LEAPS])
+    return float(last * growth ** ((_MOST - len(counts)) / _LEAPS))
 
 
 def _flattened(log_weights: Array, weights: Array, dimension: int) -> Array:

@@ -117,17 +117,41 @@ def test_none_of_what_it_cannot_reach() -> None:
             assert importance.sample(rng, density, START, WANTED)[0] is None
 
 
-def test_what_it_came_to_is_nearer_than_what_it_began_with() -> None:
-    """Where it gives no draws, chains start there: a hill far off, of a tenth of the width."""
+def far(z: np.ndarray) -> np.ndarray:
+    """A hill forty of its widths off, four of those of where it is looked for."""
+    return -0.5 * (((z - 4.0) / 0.1) ** 2).sum(axis=1)
 
-    def far(z: np.ndarray) -> np.ndarray:
-        return -0.5 * (((z - 4.0) / 0.1) ** 2).sum(axis=1)
+
+def wide(z: np.ndarray) -> np.ndarray:
+    """Twenty times as wide as where it is looked for."""
+    return -0.5 * (((z - 10.0) / 20.0) ** 2).sum(axis=1)
+
+
+@pytest.mark.parametrize(('density', 'mean', 'sd'), [(far, 4.0, 0.1), (wide, 10.0, 20.0)])
+def test_it_goes_on_while_the_mixture_comes_nearer(
+    density: Callable[[np.ndarray], np.ndarray], mean: float, sd: float
+) -> None:
+    """Few effective draws for many batches; mean and spread of a coordinate, five errors."""
+    for seed in range(5):
+        found, _ = importance.sample(np.random.default_rng(seed), density, START, WANTED)
+        assert found is not None
+        assert len(found.points) > 5 * 192
+        first = found.points[:, 0]
+        assert first.mean() == pytest.approx(mean, abs=5 * sd / np.sqrt(WANTED))
+        assert first.std() == pytest.approx(sd, rel=5 / np.sqrt(WANTED))
+
+
+def test_what_it_came_to_is_nearer_than_what_it_began_with() -> None:
+    """Where it gives no draws, chains start there: a hill far off that is full of small ones."""
+
+    def rough(z: np.ndarray) -> np.ndarray:
+        return np.asarray(far(z) + 3.0 * np.sin(70.0 * z).sum(axis=1))
 
     for seed in range(5):
-        found, reached = importance.sample(np.random.default_rng(seed), far, START, WANTED)
+        found, reached = importance.sample(np.random.default_rng(seed), rough, START, WANTED)
         assert found is None
-        begun = np.linalg.norm(START.centres - 4.0)
-        assert np.linalg.norm(reached.centres[0] - 4.0) < 0.5 * begun
+        assert np.linalg.norm(reached.centres[0] - 4.0) < 0.2
+        assert np.diag(reached.factors[0]).max() < 0.2
 
 
 def test_two_hills_share_the_draws() -> None:

@@ -387,10 +387,9 @@ class Refits:
         return [(current, n, n in far) for n in names if asked.every or n not in far]
 
     def _expected_work(self, current: Trial, name: str, briefly: bool) -> int:
-        """Return the work of a refit's first step: of all its starts, with their slopes."""
+        """Return what the work of a refit is in proportion to, roughly."""
         model = self.structure(*current.effects, name)
-        starts = 1 if briefly else len(self.promises.screen(current, name)[1])
-        return starts * len(model.parameters) * self.data.sub_steps(model)
+        return 0 if briefly else len(model.parameters) * model.program.shorter
 
     def _structure(self, fit: Fit) -> float:
         """Return the share of a fit's squared error that is no noise."""
