@@ -146,12 +146,16 @@ def sample(
 
 
 def _most_expected(counts: list[float]) -> float:
-    """Return how many effective draws the last batch has, if they go on growing as they did."""
+    """Return how many effective draws the last batch has, if they go on growing as they did.
+
+    From a mixture that no longer changes, they grow as all draws do.
+    """
     if len(counts) < 2 * _LEAPS:
         return math.inf
     last = max(counts[-_LEAPS:])
     growth = last / max(counts[:-_LEAPS])
-    return float(last * growth ** ((_MOST - len(counts)) / _LEAPS))
+    left = (_MOST - len(counts)) / _LEAPS
+    return float(last * max(growth**left, _MOST / len(counts)))
 
 
 def _flattened(log_weights: Array, weights: Array, dimension: int) -> Array:
