@@ -22,8 +22,9 @@ from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
 _MOST = 32  # batches
-# Effective draws grow by leaps and with relapses as the mixture comes nearer: their growth is that
-# of the largest number in so many batches over the largest before.
+# A run is given up where too few effective draws are expected by its last batch. They grow by
+# leaps and with relapses as the mixture comes nearer, so that their growth is that of the largest
+# number in so many batches over the largest before.
 _LEAPS = 5
 _PARETO = 0.7  # shape of the weights' tail
 _LEAST = 1e-9  # spread of coordinates that have none
@@ -146,9 +147,12 @@ def sample(
 
 
 def _most_expected(counts: list[float]) -> float:
-    """Return how many effective draws the last batch has, if they go on growing as they did.
+    """Return how many effective draws are expected by the last batch, at most.
 
-    From a mixture that no longer changes, they grow as all draws do.
+    They go on growing as they did, or, from a mixture that no longer changes, as all draws do.
+
+    Args:
+        counts: effective draws after each batch so far.
     """
     if len(counts) < 2 * _LEAPS:
         return math.inf

@@ -387,7 +387,7 @@ class Refits:
         return [(current, n, n in far) for n in names if asked.every or n not in far]
 
     def _expected_work(self, current: Trial, name: str, briefly: bool) -> int:
-        """Return what the work of a refit is in proportion to, roughly."""
+        """Return a number that is larger for refits that take longer; 0 for a brief one."""
         model = self.structure(*current.effects, name)
         return 0 if briefly else len(model.parameters) * model.program.shorter
 
