@@ -22,6 +22,7 @@ from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.ensemble import residual_of
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
+from actuator_glue.api.held_out_stiffness import with_stiffness
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.api.prior import DRIFT, check_prior, given_prior
@@ -357,7 +358,8 @@ def diagnose(
         records: one or several tests of one actuator, each with its specimen stiffness, or the
             files they are in; several go into one list.
         holdout: record(s) that decide nothing and give the error before and after; without one,
-            every fourth block of each record is set aside before any look.
+            every fourth block of each record is set aside before any look. One that does not say
+            its stiffness has the one that all records share.
         options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m] of the records, one for all or one for each; None for
             what they and their files say.
@@ -383,6 +385,7 @@ def diagnose(
         raise InputError(
             f'holdout: moves in {held[0].motion}, and the records move in {given[0].motion}'
         )
+    held, assumed = with_stiffness(held, given)
     every = [*given, *held]
     before = given_prior(options.prior, options.drift, options.prior_age)
     if before is not None:
@@ -410,7 +413,7 @@ def diagnose(
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     told = doubts(found, every) if found.complete else suspicions(every)
-    values['advice'] = (*told, *found.advice)
+    values['advice'] = (*told, *assumed, *found.advice)
     values['doubts'] = told if found.complete else ()
     values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance(every, options.seed)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -21,7 +20,6 @@ from actuator_glue.cli._heap import give_back
 from actuator_glue.cli._output import add_json, add_report, beside, note, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
-from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 from actuator_glue.records import Record
 
@@ -136,7 +134,7 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
     or values of the records alone.
 
     Raises:
-        InputError: a record cannot be used, or the stiffness of a held-out one is not known.
+        InputError: a record cannot be used.
     """
     given = list(args.stiffness or ())
     own: list[Stiffness] = []
@@ -147,33 +145,7 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
     if not args.holdout:
         return records, []
     args.records, args.stiffness = args.holdout, own or (given if len(given) == 1 else None)
-    return records, [_with_stiffness(held, records) for held in load(args)]
-
-
-def _with_stiffness(held: Record, records: Sequence[Record]) -> Record:
-    """Return a held-out record whose stiffness is known.
-
-    Where the fitted records have one, it is very likely that of this test, too, and is told; where
-    they have several, none is likelier than another.
-
-    Raises:
-        InputError: neither the file nor an option says it, and the fitted records have several.
-    """
-    if held.stiffness is not None:
-        return held
-    fitted = list(dict.fromkeys(record.stiffness for record in records))
-    if len(fitted) == 1 and fitted[0] is not None:
-        note(
-            f'{held.source}: held out, and its specimen stiffness is not said; that of the fitted '
-            f'records is taken, {fitted[0]:.12g} N/m'
-        )
-        return replace(held, stiffness=fitted[0])
-    values = ' '.join('K' if r.stiffness is None else f'{r.stiffness:.12g}' for r in records)
-    raise InputError(
-        f'{held.source}: the specimen stiffness of this held-out record is not known, and the '
-        f'fitted records do not have one in common; add one value for each held-out record to '
-        f'--stiffness, as in --stiffness {values} K'
-    )
+    return records, load(args)
 
 
 def _show(found: Diagnosis, args: argparse.Namespace) -> str:

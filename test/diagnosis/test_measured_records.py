@@ -23,6 +23,9 @@ SPECIMEN = {
     'specimen-hardening',
     'specimen-yield',
 }
+# The damper's force grows five-fold with its current while the error stays: what that force would
+# do is excluded. The mass that moves with the piston is the same at any current, and possible.
+DAMPER = SPECIMEN - {'payload-inertia'}
 
 
 def mts() -> list[Record]:
@@ -85,7 +88,7 @@ def test_mts_of_another_day_gets_what_is_supported(seed: int) -> None:
     found = diagnose([fitted], holdout=held, jobs=2)
     names = {e.name for e in found.effects}
     assert names & (REVERSAL | FLOW)
-    assert not names & SPECIMEN
+    assert not names & DAMPER
     assert found.error.removable_removed >= 0.6
     assert found.error.removed_ci[0] > 0.0
 
