@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from actuator_glue.report import style
 from actuator_glue.report.timeseries import Bands, band_at_zooms
 from studies.chen.experiment import stiffness_name, zooms
-from studies.chen.figures.look import REFERENCE, legend_below
+from studies.chen.figures.look import REFERENCE
 from studies.chen.library import TABLE_2
 from studies.chen.published import CLOSE_UPS
 from studies.chen.responses import CLOSE, GRID, LEVEL, QUANTITIES, quantity, simulate
@@ -48,7 +48,7 @@ def frequency_response(results: Results) -> Figure:
         panels[row, 0].set_ylabel(f'{name} [{symbol}]')
     for axes in panels[1]:
         axes.set(xlabel='frequency [Hz]', xlim=(0, 10))
-    legend_below(figure, panels[0, 0], 4)
+    style.legend(figure, panels[0, 0], columns=4)
     return figure
 
 
@@ -93,7 +93,7 @@ def histograms(results: Results, test: int) -> Figure:
             axes.grid(axis='y', visible=False)
             axes.locator_params(axis='x', nbins=5)
         panels[row, 0].set_ylabel('density')
-    legend_below(figure, panels[0, 0], 3)
+    style.legend(figure, panels[0, 0], columns=3)
     return figure
 
 
@@ -116,5 +116,5 @@ def coverage_by_frequency(results: Results) -> Figure:
         axes.axhline(100 * LEVEL, color='black', lw=0.8, ls=REFERENCE, label='nominal 95 %')
         axes.set(xlim=(0, 10), ylim=(0, 104), xlabel='frequency [Hz]', title=stiffness_name(test))
     panels[0].set_ylabel('samples inside [%]')
-    legend_below(figure, panels[0], 4)
+    style.legend(figure, panels[0], columns=4)
     return figure

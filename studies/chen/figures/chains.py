@@ -12,7 +12,6 @@ from studies.chen.figures.look import (
     DASHES,
     MARKS,
     REFERENCE,
-    legend_below,
     shaping_title,
 )
 from studies.chen.library import BASE
@@ -69,7 +68,7 @@ def convergence(results: Results) -> Figure:
         panels[0, column].set_title(shaping_title(name, entry.shaping_factor), loc='center')
     panels[0, 0].set_ylabel('R-hat, three chains\nfrom the prior')
     panels[1, 0].set_ylabel('R-hat, ours\n(annealed start)')
-    legend_below(figure, panels[0, 0], 5)
+    style.legend(figure, panels[0, 0], columns=5)
     return figure
 
 

@@ -9,7 +9,7 @@ from actuator_glue.report import style
 from actuator_glue.report.posterior_figure import posterior_figure
 from studies.chen import misfit
 from studies.chen.experiment import stiffness_name
-from studies.chen.figures.look import REFERENCE, legend_below
+from studies.chen.figures.look import REFERENCE
 from studies.chen.library import BASE, NOISE
 from studies.chen.published import TABLE_4
 from studies.chen.study import Results
@@ -52,7 +52,7 @@ def spread(results: Results) -> Figure:
                 axes.set_xlabel('residual rms [mm]')
     panels[0, 0].set_ylabel('COV')
     panels[1, 0].set_ylabel('skewness')
-    legend_below(figure, panels[0, 0], 4)
+    style.legend(figure, panels[0, 0], columns=4)
     return figure
 
 
@@ -79,5 +79,5 @@ def by_frequency(results: Results) -> Figure:
         axes.axhline(UM * NOISE, color='black', lw=0.8, ls=REFERENCE, label='sensor noise')
         axes.set(xlabel='frequency [Hz]', xlim=(0, 10), title=stiffness_name(test))
     panels[0].set(ylim=(0, top), ylabel='residual rms [µm]')
-    legend_below(figure, panels[0], 2)
+    style.legend(figure, panels[0], columns=2)
     return figure

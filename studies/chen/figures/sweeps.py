@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 
 from actuator_glue.report import style
 from studies.chen.experiment import zooms
-from studies.chen.figures.look import legend_below
 from studies.chen.published import CLOSE_UPS
 from studies.chen.study import Results
 
@@ -33,5 +32,5 @@ def command_and_measured(results: Results, test: int) -> Figure:
         axes.set_title(f'({letter}) {frequency:g} Hz')
         axes.locator_params(axis='x', nbins=4)
     panels[0].set_ylabel('displacement [mm]')
-    legend_below(figure, panels[0], 2)
+    style.legend(figure, panels[0], columns=2)
     return figure
