@@ -2,9 +2,15 @@
 
 Batches come from mixtures of Student t's, each fitted to the weighted batches before it (Cappe et
 al. 2008); a weight compares the posterior with the mixture of all (adaptive multiple importance
-sampling, Cornuet et al. 2012). The largest weights are smoothed by a Pareto distribution, whose
-shape k tells whether means of them are reliable: from 0.7 on, or less for few draws, they are not
-(Vehtari et al. 2024, section 3.2.4), and nothing is returned.
+sampling, Cornuet et al. 2012).
+
+The largest weights are smoothed by a Pareto distribution, whose shape k tells whether means of
+them are reliable: from 0.7 on, or less for few draws, they are not (Vehtari et al. 2024, section
+3.2.4), and nothing is returned.
+
+A tail that no draw has reached shows in no weight. With enough draws, half of each further batch
+comes from around the point whose weight is largest, where draws are too few (incremental mixture
+importance sampling, Raftery & Bao 2010), until their spreads no longer grow.
 """
 
 from __future__ import annotations
@@ -21,7 +27,8 @@ from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
-_MOST = 32  # batches
+# Batches in which enough effective draws are found, and in which their spreads become steady.
+_MOST, _LONGEST = 32, 40
 # A run is given up where too few effective draws are expected by its last batch. They grow by
 # leaps and with relapses as the mixture comes nearer, so that their growth is that of the largest
 # number in so many batches over the largest before.
@@ -34,6 +41,11 @@ _NOTHING = 1e-300  # above the cut of a tail: its inverse, a few times over, is 
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
 _PER_DIMENSION = 2  # effective points, at least, that a normal distribution is fitted to
 _BISECTIONS = 12  # find the power of the weights that leaves so many
+_NEAREST = 0.25  # of all points give the spread around the heaviest; _NEAR_PER_DIMENSION at least
+_NEAR_PER_DIMENSION = 4
+# Spreads are steady where none grew by so much over the least of so many looks before, and of a
+# third of all: the more draws there are, the less a batch can change.
+_GROWTH, _LOOKS = 0.05, 3
 
 
 class ImportanceSample(NamedTuple):
@@ -87,6 +99,14 @@ class StudentMixture(NamedTuple):
             factors.append(lower_factor(np.concatenate(rows)))
         return StudentMixture(_shared(np.array(shares)), np.array(centres), np.array(factors))
 
+    def beside(self, centre: Array, factor: Array) -> StudentMixture:
+        """Return the mixture with one more part, from which half of all draws come."""
+        return StudentMixture(
+            np.append(0.5 * self.shares / self.shares.sum(), 0.5),
+            np.concatenate([self.centres, centre[None]]),
+            np.concatenate([self.factors, factor[None]]),
+        )
+
 
 def lower_factor(rows: Array) -> Array:
     """Return the Cholesky factor (p, p) of rows.T @ rows (m, p), which may be singular."""
@@ -122,9 +142,11 @@ def sample(
     """
     dimension = start.centres.shape[1]
     points, values = np.empty((0, dimension)), np.empty(0)
-    proposals = [start._replace(shares=_shared(start.shares))]
+    fitted = start._replace(shares=_shared(start.shares))
+    proposals = [fitted]
     counts: list[float] = []
-    for _ in range(_MOST):
+    spreads: list[Array] = []
+    for _ in range(_LONGEST):
         new = proposals[-1].draw(rng, _BATCH)
         points = np.concatenate([points, new])
         values = np.concatenate([values, log_density(new)])
@@ -134,16 +156,47 @@ def sample(
         count = 1.0 / float(weights @ weights)
         counts.append(count if math.isfinite(pareto_k) else 1.0)  # else hardly any is possible
         progress(min(1.0, count / effective))
-        if count >= effective and pareto_k < min(_PARETO, 1.0 - 1.0 / math.log10(len(points))):
-            with np.errstate(divide='ignore'):
-                chosen = resample(rng, np.log(weights / weights.max()), len(points))
-            drawn = ImportanceSample(points[rng.permutation(chosen)], count, pareto_k)
-            return drawn, proposals[-1]
-        shared = _flattened(log_weights, weights, dimension)
-        proposals.append(proposals[-1].refitted(points, shared))
-        if _most_expected(counts) < effective:
+        enough = count >= effective
+        if enough and pareto_k < min(_PARETO, 1.0 - 1.0 / math.log10(len(points))):
+            spreads.append(np.sqrt(weights @ (points - weights @ points) ** 2))
+            if _steady(spreads):
+                with np.errstate(divide='ignore'):
+                    chosen = resample(rng, np.log(weights / weights.max()), len(points))
+                drawn = ImportanceSample(points[rng.permutation(chosen)], count, pareto_k)
+                return drawn, fitted
+        if not enough and (len(counts) >= _MOST or _most_expected(counts) < effective):
             break
-    return None, proposals[-1]
+        shared = _flattened(log_weights, weights, dimension)
+        fitted = fitted.refitted(points, shared)
+        heaviest = _around_heaviest(points, log_weights, shared)
+        proposals.append(fitted.beside(*heaviest) if enough else fitted)
+    return None, fitted
+
+
+def _steady(spreads: list[Array]) -> bool:
+    """Whether no spread (p,) grew over those of the looks before."""
+    looks = max(_LOOKS, len(spreads) // 3)
+    if len(spreads) <= looks:
+        return False
+    before = np.min(spreads[-1 - looks : -1], axis=0)
+    return bool(np.all(spreads[-1] < (1.0 + _GROWTH) * before))
+
+
+def _around_heaviest(points: Array, log_weights: Array, weights: Array) -> tuple[Array, Array]:
+    """Return the point (p,) of the largest weight, and the factor (p, p) of the spread near it.
+
+    The nearest points give it, their weights half their own and half equal (Raftery & Bao 2010).
+    """
+    dimension = points.shape[1]
+    heaviest = points[np.argmax(np.where(np.isfinite(log_weights), log_weights, -np.inf))]
+    mean = weights @ points
+    whole = lower_factor(np.sqrt(weights)[:, None] * (points - mean))
+    off = points - heaviest
+    distances = (np.linalg.solve(whole, off.T) ** 2).sum(axis=0)
+    count = max(round(_NEAREST * len(points)), _NEAR_PER_DIMENSION * dimension)
+    near = np.argsort(distances)[:count]
+    shares = weights[near] + 1.0 / len(points)
+    return heaviest, lower_factor(np.sqrt(shares / shares.sum())[:, None] * off[near])
 
 
 def _most_expected(counts: list[float]) -> float:
