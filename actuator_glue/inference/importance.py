@@ -153,10 +153,10 @@ def sample(
         densities = np.concatenate([p.log_densities(points) for p in proposals])
         log_weights = values - np.logaddexp.reduce(densities, axis=0)
         weights, pareto_k = smoothed(log_weights)
-        count = 1.0 / float(weights @ weights)
-        counts.append(count if math.isfinite(pareto_k) else 1.0)  # else hardly any is possible
-        progress(min(1.0, count / effective))
+        count = 1.0 / float(weights @ weights) if math.isfinite(pareto_k) else 1.0
+        counts.append(count)  # 1: hardly any is possible
         enough = count >= effective
+        progress(0.5 * min(1.0, count / effective) + 0.5 * min(1.0, len(spreads) / _LOOKS))
         if enough and pareto_k < min(_PARETO, 1.0 - 1.0 / math.log10(len(points))):
             spreads.append(np.sqrt(weights @ (points - weights @ points) ** 2))
             if _steady(spreads):
@@ -174,7 +174,7 @@ def sample(
 
 
 def _steady(spreads: list[Array]) -> bool:
-    """Whether no spread (p,) grew over those of the looks before."""
+    """Whether none of the spreads (p,) grew over those of the looks before."""
     looks = max(_LOOKS, len(spreads) // 3)
     if len(spreads) <= looks:
         return False
