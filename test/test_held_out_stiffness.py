@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from actuator_glue.api.diagnosis import diagnose
 from actuator_glue.api.held_out_stiffness import with_stiffness
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
@@ -30,3 +31,17 @@ def test_without_one_in_common_it_is_asked_for(fitted: tuple[float | None, ...])
     """None is likelier than another."""
     with pytest.raises(InputError, match=r'h: the specimen stiffness .* not known'):
         with_stiffness([record(None, 'h')], [record(k) for k in fitted])
+
+
+def test_a_diagnosis_from_python_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the command line does."""
+    asked: list[Record] = []
+
+    def refuse(records: list[Record], held: list[Record], **_: object) -> None:
+        asked.extend(held)
+        raise InterruptedError
+
+    monkeypatch.setattr('actuator_glue.api.diagnosis.core.diagnose', refuse)
+    with pytest.raises(InterruptedError):
+        diagnose(record(250e3), holdout=record(None, 'h'))
+    assert [one.stiffness for one in asked] == [250e3]

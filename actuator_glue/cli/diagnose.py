@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from actuator_glue.api.bar import progress
+from actuator_glue.api.held_out_stiffness import with_stiffness
 from actuator_glue.arguments import Input, Output, whole
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._first_page import add_partition, show_first
@@ -134,7 +135,7 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
     or values of the records alone.
 
     Raises:
-        InputError: a record cannot be used.
+        InputError: a record cannot be used, or the stiffness of a held-out one is not known.
     """
     given = list(args.stiffness or ())
     own: list[Stiffness] = []
@@ -145,7 +146,10 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
     if not args.holdout:
         return records, []
     args.records, args.stiffness = args.holdout, own or (given if len(given) == 1 else None)
-    return records, load(args)
+    held, assumed = with_stiffness(load(args), records)
+    for line in assumed:
+        note(line)
+    return records, held
 
 
 def _show(found: Diagnosis, args: argparse.Namespace) -> str:

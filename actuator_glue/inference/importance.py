@@ -102,7 +102,7 @@ class StudentMixture(NamedTuple):
     def beside(self, centre: Array, factor: Array) -> StudentMixture:
         """Return the mixture with one more part, from which half of all draws come."""
         return StudentMixture(
-            np.append(0.5 * self.shares / self.shares.sum(), 0.5),
+            np.append(0.5 * self.shares, 0.5),
             np.concatenate([self.centres, centre[None]]),
             np.concatenate([self.factors, factor[None]]),
         )
@@ -168,8 +168,10 @@ def sample(
             break
         shared = _flattened(log_weights, weights, dimension)
         fitted = fitted.refitted(points, shared)
-        heaviest = _around_heaviest(points, log_weights, shared)
-        proposals.append(fitted.beside(*heaviest) if enough else fitted)
+        around = (
+            fitted.beside(*_around_heaviest(points, log_weights, weights)) if enough else fitted
+        )
+        proposals.append(around)
     return None, fitted
 
 

@@ -57,7 +57,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Record]:
         held.extend(holdout)
         raise InputError('asked')
 
-    monkeypatch.setattr('actuator_glue.diagnosis.diagnose.diagnose', refuse)
+    monkeypatch.setattr('actuator_glue.api.diagnosis.diagnose', refuse)
     return held
 
 
@@ -82,7 +82,7 @@ def test_a_held_out_record_has_a_stiffness_of_its_own_whatever_the_order(
 
 
 def test_the_one_stiffness_of_all_records_is_taken_and_told(
-    tmp_path: Path, asked: list[Record]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], asked: list[Record]
 ) -> None:
     """What a file says itself wins."""
     one, other, held = (write(tmp_path / f'{n}.csv', 0.0, 0.0, i) for i, n in enumerate('abh'))
@@ -90,6 +90,10 @@ def test_the_one_stiffness_of_all_records_is_taken_and_told(
     says.write_text('# stiffness_N_per_m=5e4\n' + Path(held).read_text())
     line = ['diagnose', one, other, '--stiffness', '250e3', '250e3']
     assert main([*line, '--holdout', held, '--holdout', str(says)]) == 2
+    told = capsys.readouterr().err
+    assert 'h.csv: held out, and its specimen stiffness is not said' in told
+    assert 'that of the fitted records is taken, 250000 N/m' in told
+    assert 'says.csv' not in told
     assert [record.stiffness for record in asked] == [250e3, 5e4]
 
 
