@@ -84,7 +84,7 @@ tables: $(VENV_STAMP) ## tables of structures of blind machines, and what anothe
 # Seeds that nothing was set with; answers of another commit are refused by the page.
 scores: $(VENV_STAMP) ## diagnose machines of four generators and write docs/scores.md (SCORE_ARGS='--first 70100 --cases 50')
 	@for generator in cases variant mixed far; do \
-		$(BIN)/python benchmarks/blind/campaign.py --first 70000 --cases 15 --jobs 2 $(SCORE_ARGS) \
+		$(BIN)/python benchmarks/blind/campaign.py --first 70000 --cases 15 --threads 2 $(SCORE_ARGS) \
 			--generator $$generator --out out/scores/$$generator; \
 	done
 	@$(BIN)/python benchmarks/blind/page.py out/scores --out docs/scores.md

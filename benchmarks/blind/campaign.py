@@ -13,7 +13,7 @@ import os
 import subprocess
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -33,11 +33,14 @@ def commit() -> str:
     return done.stdout.strip() or 'unknown'
 
 
-def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict[str, Any]:
+def one(
+    seed: int, cache: Path, generator: str, options: dict[str, Any], threads: int = 1
+) -> dict[str, Any]:
     """Build, diagnose and cache one case; options are those of the generator."""
     path = cache / f'{seed}.json'
     if path.exists():
         return dict(json.loads(path.read_text()))
+    import time_left
     import truth
 
     from actuator_glue.diagnosis.diagnose import diagnose
@@ -48,8 +51,15 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
     names = ('first', 'second', 'held')
     rows = zip(case.commands, case.measured, case.stiffness, names, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
-    start, busy = time.perf_counter(), time.process_time()
-    found = diagnose(records[:2], records[2], seed=seed)
+    shown: list[tuple[float, float]] = []
+    with ThreadPoolExecutor(threads) as pool:
+        start, busy = time.perf_counter(), time.process_time()
+
+        def told(stage: str, share: float) -> None:
+            shown.append((time.perf_counter() - start, share))
+
+        found = diagnose(records[:2], records[2], seed=seed, each=pool.map, progress=told)
+        seconds, busy = time.perf_counter() - start, time.process_time() - busy
     result = {
         'seed': seed,
         'kind': case.kind,
@@ -60,8 +70,10 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
         'parameters': dict(zip(NAMES, map(float, case.theta), strict=True)) | case.parameters,
         'colour': case.colour,
         'stiffness': [float(k) for k in case.stiffness],
-        'seconds': time.perf_counter() - start,
-        'processor_seconds': time.process_time() - busy,
+        'seconds': seconds,
+        'processor_seconds': busy,
+        'threads': threads,
+        'told_in_time': time_left.told_in_time(shown, seconds),
         'commit': commit(),
         'generator': generator,
         'true_structure_error': truth.refitted(case, records),
@@ -82,7 +94,8 @@ def main() -> int:
     parser.add_argument(
         '--first', type=int, default=1000, help='first seed (below 1000: calibration)'
     )
-    parser.add_argument('--jobs', type=int, default=1)
+    parser.add_argument('--jobs', type=int, default=1, help='machines at a time')
+    parser.add_argument('--threads', type=int, default=1, help='threads of each diagnosis')
     parser.add_argument(
         '--generator',
         choices=('cases', 'variant', 'mixed', 'far'),
@@ -111,7 +124,10 @@ def main() -> int:
         out /= 'bare'
     results = []
     with ProcessPoolExecutor(args.jobs) as pool:
-        futures = [pool.submit(one, seed, out / 'cases', generator, options) for seed in seeds]
+        futures = [
+            pool.submit(one, seed, out / 'cases', generator, options, args.threads)
+            for seed in seeds
+        ]
         for i, future in enumerate(as_completed(futures)):
             result = future.result()
             results.append(result)
