@@ -54,6 +54,12 @@ def uniform_period(time: Array, where: str) -> float:
         how, remedy = 'goes back', _where_back(steps, at)
         if steps[at] == 0.0:
             how, remedy = 'stands still', 'cut the record there'
+            if not steps.any():
+                raise InputError(
+                    f'{where}: all {len(time)} times are {time[0]:.13g} s, written with too few '
+                    'digits to tell samples apart; give the time since the start, more digits, '
+                    'or no times and the rate'
+                )
             if steps.min() == 0.0 < steps.max():
                 remedy += (
                     '; where the times are only rounded or those of a log, and the samples are '

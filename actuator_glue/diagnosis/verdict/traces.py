@@ -1,4 +1,4 @@
-"""BandCurves of records for pictures: measured, and simulated before and after, with bands."""
+"""Curves of records for pictures: measured, and simulated before and after, with bands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from actuator_glue.records import Array
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """BandCurves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
+    """Curves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
 
     `lower_*` and `upper_*` are the limits of the 95 % predictive band before and after (n,) [m].
     """
