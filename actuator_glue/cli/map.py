@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +14,7 @@ from actuator_glue.io.json_file import write_json
 
 if TYPE_CHECKING:
     from actuator_glue.io.look import ColumnLook, FileLook
-    from actuator_glue.io.propose import Guess, ProposedMap
-
-_JOIN = '`convert COMMAND_FILE RESPONSE_FILE OUT --join time` (or `correlation`) joins both'
-_SHOWN = 8  # blocks of samples of a file that are told
+    from actuator_glue.io.propose import Guess
 
 EXAMPLES = (
     'map raw.txt --rate 1000 --out map.yaml',
@@ -46,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
         InputError: the file cannot be read, or holds no numbers.
     """
     from actuator_glue.io.look import look
+    from actuator_glue.io.proposal_text import leaves_force, map_text, refusal, why_none
     from actuator_glue.io.propose import propose
 
     found = look(args.file)
@@ -53,14 +49,14 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f'--rate {args.rate:g}: give samples per second, more than 0')
     proposal = propose(found, args.rate)
     tell = cache(note)  # what is told of both readings is told once
-    plain = not _fault(args.file, None, tell)
+    plain = not refusal(args.file, None, tell)
     rows = [_row(column, found) for column in found.columns]
     title = f'{args.file}: {found.what}, {len(found.columns)} columns of numbers'
     table(title, ('column', 'unit', 'samples', 'least', 'greatest', 'remark'), rows, args)
     # A bag that we recorded says what its channels are; no other topic of it is a channel.
     ours = plain and found.what == 'bag'
     text = map_text(found, proposal) if proposal.complete and not ours else ''
-    refused = _fault(args.file, text, tell) if text else '' if ours else _missing(found, proposal)
+    refused = refusal(args.file, text, tell) if text else '' if ours else why_none(found, proposal)
     if text:
         for line in text.splitlines():
             say(line, args)
@@ -68,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         _write(Path(args.out), text)
         say(f'{args.out}: written; check it, then `info {args.file} --channels {args.out}`', args)
     if plain:
-        lost = ', without a force' if _leaves_force(found, proposal) and not ours else ''
+        lost = ', without a force' if leaves_force(found, proposal) and not ours else ''
         say(f'{args.file} needs no channel map: it is read as it is{lost}', args)
     if refused and (text or not plain):
         note(refused)
@@ -85,104 +81,6 @@ def run(args: argparse.Namespace) -> int:
     }
     write_json(content, args.json)
     return 1 if refused and (text or not plain) else 0
-
-
-def map_text(found: FileLook, proposal: ProposedMap) -> str:
-    """Return a proposal as YAML, with a comment that says why beside each channel."""
-    lines = [f'# Proposed for {found.path.name}; check what is marked CHECK.']
-    lines += [f'{name}: {json.dumps(value)}' for name, value in found.layout.items()]
-    if len(found.blocks) > 1:
-        begun = ', '.join(f'{b.rows} below line {b.lines}' for b in found.blocks[:_SHOWN])
-        more = len(found.blocks) - _SHOWN
-        begun += f' and {more} more' if more > 0 else ''
-        lines.append(
-            f'#   CHECK block: the longest of {len(found.blocks)} is taken; rows: {begun}'
-        )
-    if proposal.rate is not None:
-        lines.append(f'rate: {proposal.rate:.9g}  # Hz')
-    if proposal.counter is not None:
-        lines.append(f'sample_number: {_quoted(proposal.counter.name)}  # goes up by one')
-    for role, guess in proposal.channels.items():
-        lines.append(_entry(role, guess))
-        lines += [f'#   CHECK {what}' for what in guess.unsure]
-    if proposal.forces:
-        lines.append('#   CHECK force: none of these is taken; uncomment the one that is meant')
-        lines += [f'# {_entry("force", guess)}' for guess in proposal.forces]
-    return '\n'.join(lines) + '\n'
-
-
-def _entry(role: str, guess: Guess) -> str:
-    scale = f', scale: {guess.scale:g}' if guess.scale != 1.0 else ''
-    entry = f'{{column: {_quoted(guess.column.name)}, unit: {_quoted(guess.unit)}{scale}}}'
-    return f'{role}: {entry}  # {"; ".join(guess.reasons)}'
-
-
-def _quoted(value: str | int) -> str:
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _fault(path: str, text: str | None, tell: Callable[[str], None]) -> str:
-    """Return why the file cannot be read with a map, or without; empty where it can."""
-    from actuator_glue.io.channel_map import parse_channel_map
-    from actuator_glue.io.load import load_records
-    from actuator_glue.io.yaml_file import parse
-
-    try:
-        channels = text and parse_channel_map(parse(text, 'proposed map'), 'proposed map')
-        load_records(path, channels=channels or None, gap=tell, warn=tell)
-    except InputError as error:
-        return f'with this map the file is refused: {error}'
-    return ''
-
-
-def _leaves_force(found: FileLook, proposal: ProposedMap) -> bool:
-    """Whether a column may be the force, and none is called so, as it is where it is read."""
-    from actuator_glue.io.units import bare
-
-    guessed = proposal.forces or 'force' in proposal.channels
-    return bool(guessed) and all(bare(column.label) != 'force' for column in found.columns)
-
-
-def _missing(found: FileLook, proposal: ProposedMap) -> str:
-    if proposal.integrated is not None:
-        one, other = (_called(column) for column in proposal.integrated)
-        return (
-            f'{other} follows the integral of {one}, which is the command of a velocity or of a '
-            'valve: no displacement command in this file. A displacement command is needed: '
-            'record the set point of the position loop'
-        )
-    names = [role for role in ('command', 'measured') if role not in proposal.channels]
-    if not names:
-        return 'no column tells the times of the samples; give their rate with --rate HZ'
-    lengths = sorted({len(c.values) for c in found.columns if c.times is None}, reverse=True)
-    if len(lengths) > 1:
-        return (
-            f'no {" and no ".join(names)} could be told from these columns, which have '
-            f'{" and ".join(map(str, lengths[:_SHOWN]))} samples: channels of one test need one '
-            'rate and length'
-        )
-    if 'command' in names:
-        others = ' and '.join(repr(name) for name in proposal.other_commands)
-        instead = f'; {others} commands something else' if others else ''
-        return (
-            'no command in this file: no displacement is called so (command, target, set point, '
-            f'demand, reference, soll), and none is followed by another{instead}. A displacement '
-            f'command is needed: record it; where another file of the test has it, {_JOIN}; or '
-            'name its column in a channel map written by hand (docs/howto_your_data.md)'
-        )
-    if 'command' in proposal.channels:
-        return (
-            'no measured displacement could be told from these columns; where another file of the '
-            f'test has it, {_JOIN}; else write the channel map by hand (docs/howto_your_data.md)'
-        )
-    return (
-        f'no {" and no ".join(names)} could be told from these columns; write the channel map by '
-        'hand (docs/howto_your_data.md)'
-    )
-
-
-def _called(column: ColumnLook) -> str:
-    return column.label.strip() or f'column {column.name}'
 
 
 def _write(path: Path, text: str) -> None:
