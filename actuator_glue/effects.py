@@ -21,6 +21,7 @@ from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.plain_yaml import plain_yaml
+from actuator_glue.whole_file import whole_file
 
 register = CATALOGUE.register
 unregister = CATALOGUE.unregister
@@ -84,12 +85,8 @@ def save_effects(path: Path | str, effects: Iterable[Effect]) -> None:
         if effect.expression is None:
             raise InputError(f'effect {effect.name!r} is not written as an expression')
     text = yaml.safe_dump(mapping(chosen), sort_keys=False, allow_unicode=True)
-    path = given_path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding='utf-8')
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror})') from error
+    with whole_file(given_path(path)) as part:
+        part.write_text(text, encoding='utf-8')
 
 
 def _yaml(text: str, path: Path) -> Any:

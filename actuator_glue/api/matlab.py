@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from actuator_glue.errors import InputError
 from actuator_glue.given import path as given_path
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array
+from actuator_glue.whole_file import whole_file
 
 
 class TransferFunction(NamedTuple):
@@ -110,11 +110,8 @@ def write_mat(
         'model': model,
     }
     path = given_path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        scipy.io.savemat(str(path), content, appendmat=False, do_compression=True)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    with whole_file(path) as part:
+        scipy.io.savemat(str(part), content, appendmat=False, do_compression=True)
     return path
 
 

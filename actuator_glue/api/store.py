@@ -17,6 +17,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.given import path as given_path
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.whole_file import whole_file
 
 T = TypeVar('T')
 _CONTENT = 'content'
@@ -45,12 +46,8 @@ def save(
         )
     )
     path = given_path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open('wb') as file:
-            np.savez_compressed(file, allow_pickle=False, **{**more, **arrays, _CONTENT: text})
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    with whole_file(path) as part, part.open('wb') as file:
+        np.savez_compressed(file, allow_pickle=False, **{**more, **arrays, _CONTENT: text})
     return path
 
 

@@ -13,8 +13,8 @@ from actuator_glue.campaigns.grouping import Task
 from actuator_glue.campaigns.rows import BETWEEN, Row
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
-from actuator_glue.io.whole_file import replaced
 from actuator_glue.records import Array, Record, source_names
+from actuator_glue.whole_file import replaced
 
 if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration

@@ -13,9 +13,9 @@ from actuator_glue.campaigns.grouping import Member, Task
 from actuator_glue.errors import InputError
 from actuator_glue.given import path as path_given
 from actuator_glue.io.bag_reader import bag_files, is_bag
-from actuator_glue.io.whole_file import replaced
 from actuator_glue.json_value import json_value
 from actuator_glue.optional_library import library
+from actuator_glue.whole_file import replaced
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -7,10 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.arguments import Input, Output, make_room, number
+from actuator_glue.arguments import Input, Output, number
 from actuator_glue.cli._output import add_json, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
+from actuator_glue.whole_file import whole_file
 
 if TYPE_CHECKING:
     from actuator_glue.io.look import ColumnLook, FileLook
@@ -61,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
         for line in text.splitlines():
             say(line, args)
     if text and args.out is not None:
-        _write(Path(args.out), text)
+        with whole_file(Path(args.out)) as part:
+            part.write_text(text, encoding='utf-8')
         say(f'{args.out}: written; check it, then `info {args.file} --channels {args.out}`', args)
     if plain:
         lost = ', without a force' if leaves_force(found, proposal) and not ours else ''
@@ -81,14 +83,6 @@ def run(args: argparse.Namespace) -> int:
     }
     write_json(content, args.json)
     return 1 if refused and (text or not plain) else 0
-
-
-def _write(path: Path, text: str) -> None:
-    make_room(path)
-    try:
-        path.write_text(text, encoding='utf-8')
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
 
 
 def _row(column: ColumnLook, found: FileLook) -> tuple[str, ...]:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import formats, writable
-from actuator_glue.io.whole_file import whole_file
 from actuator_glue.motion import METRES, MOTIONS, WRITTEN
 from actuator_glue.records import Array, Record
+from actuator_glue.whole_file import whole_file
 
 
 def _columns(record: Record, unit: str) -> dict[str, Array]:

@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.errors import InputError
-from actuator_glue.io.whole_file import whole_file
 from actuator_glue.json_value import json_value
+from actuator_glue.whole_file import whole_file
 
 
 def write_json(content: dict[str, Any], out: str | None) -> None:
@@ -24,13 +23,5 @@ def write_json(content: dict[str, Any], out: str | None) -> None:
     if out == '-':
         sys.stdout.write(text)
         return
-    path = Path(out)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and not path.is_file():  # a device or pipe stays what it is
-            path.write_text(text, 'utf-8')
-            return
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
-    with whole_file(path) as temporary:
+    with whole_file(Path(out)) as temporary:
         temporary.write_text(text, 'utf-8')

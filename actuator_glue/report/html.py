@@ -11,10 +11,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from matplotlib.figure import Figure
 
 from actuator_glue import __version__
-from actuator_glue.errors import InputError
 from actuator_glue.motion import spoken
 from actuator_glue.report.page_name import page_path
 from actuator_glue.report.style import data_uri, narrowed
+from actuator_glue.whole_file import whole_file
 
 TEMPLATES = Path(__file__).with_name('templates')
 
@@ -137,10 +137,7 @@ def write(path: Path | str, page: Page) -> Path:
     """
     path = page_path(path)
     text = render(page)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as part:
         # A file name may hold bytes that are no text.
-        path.write_text(text, encoding='utf-8', errors='backslashreplace')
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+        part.write_text(text, encoding='utf-8', errors='backslashreplace')
     return path

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 
+# Where names stand for what is open already, /dev/stdout say.
+_OPENED = ('/', 'dev'), ('/', 'proc')
+
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
@@ -34,11 +37,18 @@ def replaced(path: Path) -> Iterator[Path]:
 def whole_file(path: Path) -> Iterator[Path]:
     """Yield a file that takes the name `path` once it is complete and on the disk.
 
+    Its folder is made. What was there stays where writing fails; a link stays a link, and a
+    device or pipe is written as it is.
+
     Raises:
         InputError: it cannot be written.
     """
     try:
-        with replaced(path) as part:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and (not path.is_file() or path.parts[:2] in _OPENED):
+            yield path
+            return
+        with replaced(path.resolve()) as part:
             yield part
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
