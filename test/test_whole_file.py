@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from actuator_glue.api import matlab, store
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
-from actuator_glue.report import html
+from actuator_glue.report import html, style
 from actuator_glue.whole_file import replaced, whole_file
 
 
@@ -27,6 +28,7 @@ SAVERS: dict[str, Callable[[Path], object]] = {
         path, np.ones((3, 1)), {'beta_1': '1/s'}, (), effects=(), problems=()
     ),
     '.html': lambda path: html.write(path, html.Page('title', '', ())),
+    '.png': lambda path: style.save(Figure(), path),
     '.yaml': lambda path: save_effects(path, ()),
 }
 
@@ -71,7 +73,7 @@ def test_what_is_no_file_is_written_as_it_is() -> None:
             assert part == Path(name)
 
 
-@pytest.mark.parametrize('name', ['it.npz', 'it.mat', 'it.html', 'it.yaml'])
+@pytest.mark.parametrize('name', sorted(f'it{suffix}' for suffix in SAVERS))
 def test_a_full_disk_takes_nothing_from_what_was_saved(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from actuator_glue.errors import printable
 from actuator_glue.motion import spoken, spoken_of
+from actuator_glue.whole_file import whole_file
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -235,11 +236,11 @@ def save(figure: Figure, path: Path) -> Path:
     """Write a figure to a file, its format taken from the suffix (png, svg, pdf); return the path.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     _speak(figure)
-    figure.savefig(path)
+    with whole_file(path) as part:
+        figure.savefig(part)
     return path
 
 
