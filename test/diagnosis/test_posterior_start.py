@@ -95,3 +95,15 @@ def test_chains_start_inside_of_the_bounds_whatever_is_linear_there(rng_seed: in
     assert len(points) == 200
     assert np.isfinite(around.inverse(points)[1]).all()
     assert (points.std(axis=0)[1:4] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ('rhat', 'evaluations', 'given_up'),
+    [(3.4, 4_100, True), (1.5, 4_100, False), (1.33, 8_800, True), (14.0, 2_100, False)],
+)
+def test_chains_that_cannot_meet_any_more_are_given_up(
+    rhat: float, evaluations: int, given_up: bool
+) -> None:
+    """Far apart at a third of the evaluations, or near their end; not where they just began."""
+    assert posterior.hopeless(rhat, evaluations, 10_400) == given_up
+    assert not posterior.hopeless(float('nan'), evaluations, 10_400)
