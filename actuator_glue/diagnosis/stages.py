@@ -40,9 +40,8 @@ EFFECTS: tuple[Stage, ...] = (
 )
 # Share of the time of a diagnosis at which each stage begins: where Eq. (2) leaves nothing that
 # matters, where it leaves something, and where that is more than one effect. The first stages come
-# before that is known. With these, the time left was told within a factor of two, or a second, in
-# 78 % of the seconds of a machine, by mean over the 48 that they were set with; least where a
-# search begins again.
+# before that is known. Set with 48 machines; how well they tell the time left of others stands in
+# docs/scores.md. Where a search begins again they tell it least well.
 _NOTHING: dict[Stage, float] = {
     'check': 0.0,
     'base fit': 0.13,
