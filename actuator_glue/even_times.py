@@ -56,9 +56,9 @@ def uniform_period(time: Array, where: str) -> float:
             how, remedy = 'stands still', 'cut the record there'
             if not steps.any():
                 raise InputError(
-                    f'{where}: all {len(time)} times are {time[0]:.13g} s, written with too few '
-                    'digits to tell samples apart; give the time since the start, more digits, '
-                    'or no times and the rate'
+                    f'{where}: time stands still: all {len(time)} times are {time[0]:.13g} s, too '
+                    'few digits to tell samples apart; give the time since the start, more '
+                    'digits, or no times and the rate'
                 )
             if steps.min() == 0.0 < steps.max():
                 remedy += (

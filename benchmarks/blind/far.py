@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from case import Case
-from sizing import Array
+from sizing import Array, base_residual
 
 from actuator_glue.api.simulation import Command
 from actuator_glue.model.effects import CATALOGUE, scale
@@ -84,14 +84,14 @@ def build(seed: int, effect: str = '') -> Case:
     inputs = [amplitude * command(rng, rate, duration, last) for _ in stiffness]
     still = [Record(u, u, 1.0 / rate, k) for u, k in zip(inputs, stiffness, strict=True)]
 
-    healthy, model = Structure(()), Structure(names)
+    model = Structure(names)
     values = model.neutral(theta)
     for entry in model.entries:
         sizes = list(entry.starts(scale(still, theta)))
         bounds = np.array([(p.lower, p.upper) for p in entry.parameters]).T
         values[model.columns(entry.name)] = np.clip(sizes[len(sizes) // 2], *bounds)
     clean = [model.simulate(values, r) for r in still]
-    moved = [y - healthy.simulate(theta, r) for y, r in zip(clean, still, strict=True)]
+    left = base_residual(theta, inputs, clean, stiffness, rate) if names else 0.0
     return Case(
         seed,
         'single' if names else 'none',
@@ -102,7 +102,7 @@ def build(seed: int, effect: str = '') -> Case:
         inputs,
         [y + noise * rng.standard_normal(len(y)) for y in clean],
         clean,
-        float(np.sqrt(np.mean(np.concatenate(moved[:2]) ** 2))) / noise,
+        left / noise,
         0.0,
         parameters={p.name: float(v) for p, v in zip(model.parameters, values, strict=True)},
     )
