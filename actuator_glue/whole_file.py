@@ -27,6 +27,8 @@ def replaced(path: Path) -> Iterator[Path]:
         yield part
         with part.open('rb') as written:
             os.fsync(written.fileno())
+        with suppress(OSError):  # who may read what was there may read this
+            part.chmod(path.stat().st_mode & 0o777)
         part.replace(path)
     finally:
         with suppress(OSError):

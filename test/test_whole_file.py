@@ -54,6 +54,16 @@ def test_two_that_write_one_file_do_not_meet(tmp_path: Path) -> None:
     assert path.read_text() == 'mine' and list(tmp_path.iterdir()) == [path]
 
 
+def test_who_may_read_a_file_stays(tmp_path: Path) -> None:
+    """One that only its owner reads is not opened to others by being written anew."""
+    path = tmp_path / 'it.txt'
+    path.write_text('before')
+    path.chmod(0o600)
+    with whole_file(path) as part:
+        part.write_text('after')
+    assert path.read_text() == 'after' and path.stat().st_mode & 0o777 == 0o600
+
+
 def test_a_link_stays_a_link_and_a_folder_is_made(tmp_path: Path) -> None:
     """What the link leads to is written."""
     target = tmp_path / 'new' / 'it.txt'
